@@ -10,7 +10,7 @@ from bayeshaptic.diagnosis.analysis import Analysis
 from bayeshaptic.diagnosis.base.alignment import perhaps_early
 from bayeshaptic.diagnosis.base.asked import measurement_of
 from bayeshaptic.diagnosis.base.begun import Begun, begin, simpler
-from bayeshaptic.diagnosis.base.high_passed import perhaps_high_passed
+from bayeshaptic.diagnosis.base.high_passed import TOPIC as HIGH_PASSED, perhaps_high_passed
 from bayeshaptic.diagnosis.base.opened import Clock
 from bayeshaptic.diagnosis.battery import residual_tests
 from bayeshaptic.diagnosis.feedback.units_in_loop import with_units_of
@@ -113,11 +113,11 @@ def finish(
         limit = watch.limit_of(posterior)
         etfe_limit = witness or etfe_critical_stiffness(etfe, seed=options.seed, sensor=fit.sensor)
     options.report(0.9, "writing the report")
-    notices = (
-        *begun.notices,
-        *perhaps_early(replace(begun, etfe=etfe), fit, simpler(begun, fit, options)),
-        *perhaps_high_passed(fit, etfe, begun.choice),
+    notices = begun.notices + perhaps_early(
+        replace(begun, etfe=etfe), fit, simpler(begun, fit, options)
     )
+    if fit is not begun.fit and all(notice.topic != HIGH_PASSED for notice in notices):
+        notices += perhaps_high_passed(fit, etfe, begun.choice)
     if etfe.direct or etfe.through_reference:
         notices = with_units_of(fit, etfe.recording, begun.device, notices)
     return Analysis(

@@ -92,8 +92,8 @@ def test_two_studies_are_not_written_into_one_folder(tmp_path: Path) -> None:
         assert other.stdout is not None and other.stdout.readline()
         job = Job(study, out, Settings())
         for run in (
-            partial(report_study, job, None),
-            partial(report_population, job, None),
+            partial(report_study, job, None, 1),
+            partial(report_population, job, None, 1),
             partial(run_batch, [batch], out),
         ):
             with pytest.raises(InputError, match="out: another run of bayeshaptic is writing"):
@@ -105,7 +105,7 @@ def test_two_studies_are_not_written_into_one_folder(tmp_path: Path) -> None:
         pass
     assert os.listdir(out) == []
     shutil.rmtree(tmp_path / "new")
-    assert [one.page for one in report_study(job, None)] == [None]  # nothing could be used
+    assert [one.page for one in report_study(job, None, 1)] == [None]  # nothing could be used
     assert not (tmp_path / "new").exists()
 
 
@@ -116,12 +116,12 @@ def test_what_is_in_the_way_of_a_study_is_told_before_any_work(tmp_path: Path) -
     out.mkdir()
     (out / "free").write_text("a file where a folder is to be")
     with pytest.raises(InputError, match="free is a file; name a folder"):
-        report_study(Job(study, out, Settings()), None)
+        report_study(Job(study, out, Settings()), None, 1)
     (out / "free").unlink()
     (out / "free").mkdir()
     (out / "free" / "limits.csv").write_text("time_s,force_n,position_m\n")
     with pytest.raises(InputError, match=r"limits\.csv: .* of no report; move it"):
-        report_study(Job(study, out, Settings()), None)
+        report_study(Job(study, out, Settings()), None, 1)
     assert sorted(os.listdir(out)) == ["free"]
 
 

@@ -9,6 +9,7 @@ from bayeshaptic.devices import Device
 from bayeshaptic.diagnosis.base.alignment import realigned
 from bayeshaptic.diagnosis.base.asked import base_model
 from bayeshaptic.diagnosis.base.file_in_doubt import file_in_doubt
+from bayeshaptic.diagnosis.base.high_passed import perhaps_high_passed
 from bayeshaptic.diagnosis.base.opened import Clock, Opened, opened
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.inference.choose import Choice, choose_model
@@ -59,6 +60,7 @@ def fitted(found: Opened, model: str | Model, options: Options) -> Begun:
         tried = {fit.model.name: fit}
         tried |= {name: one.fit for name, one in choice.candidates.items()} if choice else {}
         doubt = file_in_doubt(etfe, tried, found.device, options)
+        doubt = (*doubt, *perhaps_high_passed(fit, etfe, choice))
     notices = (*found.notices, *doubt)
     parts = {**vars(found), "etfe": etfe, "notices": notices, "seconds": clock.seconds}
     return Begun(**parts, measured=found.etfe, fit=fit, choice=choice)

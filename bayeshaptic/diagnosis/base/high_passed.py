@@ -93,7 +93,7 @@ def perhaps_high_passed(fit: Fit, etfe: Etfe, choice: Choice | None) -> tuple[No
         Where base models are found; None where a model was asked for.
     """
     recording = etfe.unbroken
-    if recording is None or etfe.direct or _are_counts(recording):
+    if recording is None or _are_counts(recording):
         return ()
     filtered = [
         least_squares(model.with_effect(HighPass.around(etfe.band_hz[0], order)), etfe, most_sets=1)
