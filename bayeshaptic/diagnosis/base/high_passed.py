@@ -32,9 +32,9 @@ from bayeshaptic.types import Floats
 TOPIC = "high-passed position"
 _BASES = ("rigid", "free", "grasped")  # a longer chain has valleys enough without a filter
 _CORNER = "high_pass_hz"
-# Of the position, by rms: 33 high-passed ones leave 0.003 to 0.035 of themselves; held devices that
-# nobody filtered 0.14 to 0.6, of five that looked like one by their response (docs/door.md).
-_LITTLE, _HALF = 0.05, 0.5
+# Of the position, by rms: 35 high-passed ones leave 0.003 to 0.058 of themselves; of five held ones
+# that looked filtered by their response, and were not, four leave 0.14 to 0.6 (docs/door.md).
+_LITTLE, _HALF = 0.1, 0.5
 _SURELY = 10.0  # "very strong" evidence (R. E. Kass and A. E. Raftery, JASA 90, 1995)
 _ROUNDED = 1e-3  # of a power of ten, as a logarithm
 _LOG_SD = 1.5  # of the corner, around the lower end of the band: it only bounds the search
