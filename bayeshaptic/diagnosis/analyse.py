@@ -116,6 +116,7 @@ def finish(
     notices = begun.notices + perhaps_early(
         replace(begun, etfe=etfe), fit, simpler(begun, fit, options)
     )
+    # Asked of the base model before; beside another effect a filter shows once that is there.
     if fit is not begun.fit and all(notice.topic != HIGH_PASSED for notice in notices):
         notices += perhaps_high_passed(fit, etfe, begun.choice)
     if etfe.direct or etfe.through_reference:

@@ -158,9 +158,10 @@ def _odd_notice(odd: Sequence[Analysed], like: Sequence[Analysed]) -> list[Notic
 
     common = told(like[0])
     others = "; ".join(f"{one.name} ({told(one)})" for one in odd)
+    of = f"the {len(like)} recordings" if len(like) > 1 else "the one recording"
+    same = f"the same model and {common}" if len(like) > 1 else common
     text = (
-        f"The population is that of the {len(like)} recordings with the same model and {common}. "
-        f"Left out, and cases of their own: {others}."
+        f"The population is that of {of} with {same}. Left out, and cases of their own: {others}."
     )
     return [Notice("warning", "population", text)]
 

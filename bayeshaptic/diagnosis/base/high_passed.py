@@ -161,8 +161,7 @@ def _no_larger(fit: Fit, choice: Choice | None) -> list[Model]:
 def _limit(fit: Fit) -> float:
     """The limit of the device without what was done to the record alone."""
     model, theta = fit.model, fit.theta
-    for effect in model.effects:
-        if isinstance(effect, HighPass):
-            theta = np.delete(theta, model.names.index(_CORNER))
-            model = model.without_effect(effect)
+    if _CORNER in model.names:
+        theta = np.delete(theta, model.names.index(_CORNER))
+        model = model.without_effect(model.effects[-1])
     return float(critical_stiffness(model, theta).value)
