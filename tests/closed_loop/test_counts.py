@@ -84,7 +84,7 @@ def test_a_normal_that_is_cut_at_zero_is_found_by_its_moments() -> None:
         sd = np.sqrt(variance)
         # Tables are straight between their rows.
         assert cut_normals.skewness(at / sd) == pytest.approx(float(skew), rel=0.02)
-        end, before, wide = cut_normals.cut_off(float(skew))
+        end, before, wide, whole = cut_normals.cut_off(float(skew))
         assert end == pytest.approx(-at / sd, rel=0.01)
         assert before == pytest.approx((mean - at) / sd, rel=0.01, abs=0.01)
         assert wide == pytest.approx(1 / sd, rel=0.01)

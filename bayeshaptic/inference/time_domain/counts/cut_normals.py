@@ -88,7 +88,7 @@ def _cut_at_zero(ratios: Floats, skews: Floats) -> tuple[Floats, Floats]:
 
 
 _RATIO, _RATIO_STEP = 1.02, 0.06  # next to 1 is the exponential; above 4.5 nothing is cut off
-_SKEW_STEP = 0.02
+_SKEW_STEP = LEAST_SKEW = 0.02  # a normal of less is not cut off
 _OF_RATIO, _OF_SKEW = _cut_at_zero(
     np.asarray(_RATIO + _RATIO_STEP * np.arange(59)), np.asarray(_SKEW_STEP * np.arange(91))
 )
@@ -105,15 +105,42 @@ def skewness(ratio: float) -> float:
 
 
 @kernel(inline=True)
-def cut_off(skew: float) -> tuple[float, float, float]:
-    """Where it is cut off, its mean and standard deviation before; itself of mean 0, variance 1."""
+def handed_on(side: int, velocity: float, variance: float, shared: float) -> float:
+    """Skewness of what a velocity of one sign makes a part of, `shared` its covariance over its sd.
+
+    The part of the variance counts to the power of three halves: the rest is a normal's.
+    """
+    if side == 0 or not variance > 0 or not shared > 0:
+        return 0.0
+    known = math.sqrt(variance)
+    return skewness(side * velocity / known) * min(shared / known, 1.0) ** 3
+
+
+@kernel(inline=True)
+def cut_off(skew: float) -> tuple[float, float, float, float]:
+    """Where it is cut off; mean, standard deviation and what remains of it before it is cut.
+
+    Itself it has mean 0 and variance 1.
+    """
     at = skew / _SKEW_STEP
-    if at < 1:
-        return -FAR, 0.0, 1.0
+    if skew < LEAST_SKEW:
+        return -FAR, 0.0, 1.0, 1.0
     i = min(int(at), len(_OF_SKEW) - 2)
     low, high, part = _OF_SKEW[i], _OF_SKEW[i + 1], min(at - i, 1.0)
-    return (
-        low[0] + part * (high[0] - low[0]),
-        low[1] + part * (high[1] - low[1]),
-        low[2] + part * (high[2] - low[2]),
-    )
+    end = low[0] + part * (high[0] - low[0])
+    mean = low[1] + part * (high[1] - low[1])
+    wide = low[2] + part * (high[2] - low[2])
+    return end, mean, wide, below((mean - end) / wide)
+
+
+@kernel(inline=True)
+def between_cut(
+    low: float, high: float, cut: tuple[float, float, float, float]
+) -> tuple[float, float, float]:
+    """The same as `between`, of a normal that is cut off and has mean 0 and variance 1 then."""
+    end, mean, wide, whole = cut
+    low = max(low, end)
+    if high <= low:
+        return 0.0, 0.0, 1.0
+    likely, at, left = between((low - mean) / wide, (high - mean) / wide)
+    return likely / whole, mean + wide * at, left * wide * wide

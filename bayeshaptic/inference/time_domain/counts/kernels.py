@@ -1,9 +1,9 @@
 """How likely every count of a mass with dry friction is after those before, in one compiled pass.
 
-What is known of the mass is a mixture: it moves forward, is held, or moves backward, and its
-position lies in one of the cells that a count is cut into; in each of these cases position,
-velocity and the white force of the present sample are normal, and a velocity that has one sign is
-cut off at zero.
+What is known of the mass is a mixture: it moves forward, is held, or moves backward, since this
+sample or for longer, and its position lies in one of the cells that a count is cut into; in each of
+these cases position, velocity and the white force of the present sample are normal, and a velocity
+that has one sign is cut off at zero.
 
 It contains `cases.py` and `cut_normals.py` beside it, and is to be compiled anew where those are
 changed.
@@ -16,15 +16,24 @@ import math
 import numpy as np
 
 from bayeshaptic.compiled import kernel
-from bayeshaptic.inference.time_domain.counts.cases import SLIGHT, add, middle, outcome
+from bayeshaptic.inference.time_domain.counts.cases import (
+    AGES,
+    BLOCKS,
+    SLIGHT,
+    add,
+    middle,
+    outcome,
+    side_of,
+)
 from bayeshaptic.inference.time_domain.counts.cut_normals import (
     FAR,
+    LEAST_SKEW,
     below,
-    between,
+    between_cut,
     cut_off,
     density,
+    handed_on,
     moments,
-    skewness,
 )
 from bayeshaptic.types import Floats
 
@@ -43,22 +52,22 @@ def _later(
     cases: Floats, into: Floats, force: float, held: Floats, dry: float, span_s: float, fresh: float
 ) -> None:
     """All cases after a span under a constant force; with a new white force where `fresh` > 0."""
-    cells = len(cases) // 3
+    cells = len(cases) // BLOCKS
     push, rub = held[3] * force, held[3] * dry
-    low, high = -rub - push, rub - push  # of the velocity: between them it comes to rest
-    if push > rub:
-        high = 0.0
-    elif push < -rub:
-        low = 0.0
     into[:, 0] = 0.0
     case, new, pushed = np.empty(10), np.empty(10), np.empty(7)
     for i in range(len(cases)):
         if cases[i, 0] <= SLIGHT:
             continue
+        side = side_of(i // cells)
+        age = min(abs(AGES - i // cells) - 1 + (fresh > 0), AGES - 1)
         case[:] = cases[i]
         if fresh > 0:
             case[3] = case[7] = case[8] = 0.0
             case[9] = fresh**2
+        elif side == 0:  # what held it is that of before
+            add(into[i], case)
+            continue
         with_x = held[0] * case[5] + held[3] * case[7]
         with_v = held[0] * case[6] + held[3] * case[8]
         with_f = held[0] * case[8] + held[3] * case[9]
@@ -67,39 +76,35 @@ def _later(
         pushed[0], pushed[1] = velocity, sd
         pushed[2], pushed[3], pushed[4] = with_x, with_v, with_f
         pushed[5], pushed[6] = push, rub
+        # Between them it is held, or reverses if it is pushed back more than rubs.
+        low = 0.0 if side > 0 and push < -rub else -rub - push
+        high = 0.0 if side < 0 and push > rub else rub - push
         rests = min(max((low - velocity) / sd, -FAR), FAR)
         leaves = min(max((high - velocity) / sd, -FAR), FAR)
-        side = 1 - i // cells
         goes_on = 1 if side == 0 else side
         # A velocity of one sign is cut off at zero; the less so, the more of it the force makes.
-        skew = 0.0
-        if side != 0 and case[6] > 0:
-            known = math.sqrt(case[6])
-            skew = skewness(side * case[2] / known) * (with_v / (sd * known)) ** 3
-        end, mean, wide = cut_off(skew)
-        whole = below((mean - end) / wide)
+        cut = cut_off(handed_on(side, case[2], case[6], with_v / sd))
         gone, first_of, second_of = 0.0, 0.0, 0.0
         for way in (-goes_on, 0):
             first = -FAR if way < 0 else rests if way == 0 else leaves
             last = rests if way < 0 else leaves if way == 0 else FAR
             if side < 0:
                 first, last = -last, -first
-            first = max(first, end)
             if last <= first or first > _SURE or last < -_SURE:
                 continue
-            likely, at, left = between((first - mean) / wide, (last - mean) / wide)
-            likely, at, left = likely / whole, goes_on * (mean + wide * at), left * wide * wide
+            likely, at, left = between_cut(first, last, cut)
             if likely > SLIGHT:
-                part = (likely, at, left)
-                outcome(into, i % cells, way, case, pushed, part, held, span_s, new)
+                part = (likely, goes_on * at, left)
+                since = (side, age)
+                outcome(into, i % cells, way, case, since, pushed, part, held, span_s, new)
                 gone += likely
-                first_of += likely * at
+                first_of += likely * goes_on * at
                 second_of += likely * (left + at * at)
         stays = 1 - gone
         if stays > SLIGHT:  # what is left of the whole, so that its means and covariances are kept
             at = -first_of / stays
             part = (stays, at, min(max((1 - second_of) / stays - at * at, 1e-4), 1.0))
-            outcome(into, i % cells, goes_on, case, pushed, part, held, span_s, new)
+            outcome(into, i % cells, goes_on, case, (side, age), pushed, part, held, span_s, new)
 
 
 @kernel(inline=True)
@@ -108,7 +113,7 @@ def _seen(cases: Floats, into: Floats, low: float, unit: float, reach: float, be
 
     How many normals were added is returned.
     """
-    cells, added = len(cases) // 3, 0
+    cells, added = len(cases) // BLOCKS, 0
     cell, new = unit / cells, np.empty(10)
     for i in range(len(cases)):
         if cases[i, 0] <= SLIGHT:
@@ -124,12 +129,22 @@ def _seen(cases: Floats, into: Floats, low: float, unit: float, reach: float, be
         first = max(int(math.floor((begins - reach * sd) / cell)), 0)
         last = min(int(math.floor((begins + reach * sd) / cell)), cells - 1)
         by_v, by_f = cases[i, 5] / xx, cases[i, 7] / xx
+        # What moved one way alone is further on than it was: its position is cut off, too.
+        side = side_of(i // cells)
+        skew = handed_on(side, cases[i, 2], cases[i, 6], cases[i, 5] / sd)
+        cut, turn = cut_off(skew), side * sign
         start = (first * cell - begins) / sd
         above, steep = below(-start), density(start)
         for j in range(first, last + 1):
             end = ((j + 1) * cell - begins) / sd
             rest, flat = below(-end), density(end)
-            likely, at, left = moments(start, end, above - rest, steep, flat)
+            if skew < LEAST_SKEW:
+                likely, at, left = moments(start, end, above - rest, steep, flat)
+            elif turn > 0:
+                likely, at, left = between_cut(start, end, cut)
+            else:
+                likely, at, left = between_cut(-end, -start, cut)
+                at = -at
             start, above, steep = end, rest, flat
             if not cases[i, 0] * likely > 1e-300:
                 continue
@@ -179,7 +194,7 @@ def followed(
         Parts that a count is cut into.
     """
     dry, offset, force_sd, whole, late_s, period_s = loads
-    cases, other = np.zeros((3 * cells, 10)), np.zeros((3 * cells, 10))
+    cases, other = np.zeros((BLOCKS * cells, 10)), np.zeros((BLOCKS * cells, 10))
     out = np.zeros((4, len(position)))
     unknown = (3 * np.std(np.diff(position)) + 10 * unit) / period_s
     cell = unit / cells
@@ -211,7 +226,7 @@ def followed(
         if k < _BEGINS:
             cases[:, 6] += unknown**2
         now = command[max(k - int(whole), 0)] - offset + more[k]
-        old = command[max(k - int(whole) - 1, 0)] - offset + more[k]
+        old = command[max(k - int(whole) - 1, 0)] - offset + more[max(k - 1, 0)]
         _later(cases, other, old, held[0], dry, late_s, 0.0)
         cases, other = other, cases
         _later(cases, other, now, held[1], dry, period_s - late_s, force_sd)
