@@ -64,6 +64,23 @@ def looped(
     return recording_from_arrays(force[:samples], position, PERIOD_S)
 
 
+def crawling(samples: int, seed: int, count: float) -> Recording:
+    """A mass pushed about as hard as friction holds it: the white force moves it at times."""
+    rng = np.random.default_rng(seed)
+    force = TRUTH[3] + TRUTH[2] * (0.95 + 0.04 * np.sign(np.sin(np.arange(samples))))
+    x, v = np.zeros(1), np.zeros(1)
+    white, position = 0.0, np.zeros(samples)
+    whole, late_s = divmod(TRUTH[4], PERIOD_S)
+    for k in range(samples):
+        position[k] = np.round(x[0] / count) * count
+        for ago, span_s in ((int(whole) + 1, late_s), (int(whole), PERIOD_S - late_s)):
+            if ago == int(whole):
+                white = FORCE_SD * rng.standard_normal()
+            pull = (force[k - ago] if k >= ago else 0.0) - TRUTH[3] + white
+            x, v = moved(x, v, pull, TRUTH, span_s)
+    return recording_from_arrays(force, position, PERIOD_S)
+
+
 def counts_of(recording: Recording, unit: float = COUNT, cells: int = 16) -> Counts:
     signals = np.array(recording.force), np.array(recording.position)
     return Counts(*signals, PERIOD_S, unit, cells)
@@ -90,34 +107,46 @@ def test_a_normal_that_is_cut_at_zero_is_found_by_its_moments() -> None:
         assert wide == pytest.approx(1 / sd, rel=0.01)
 
 
-def test_probabilities_are_those_of_many_masses() -> None:
-    """Beside particles, each a mass of its own; friction holds some of them for a while."""
-    recording = looped(0.3, seed=3)
-    counts = counts_of(recording)
-    found = counts.after(TRUTH, FORCE_SD).likely
-    rng = np.random.default_rng(4)
-    many = 40_000
+def among_particles(counts: Counts, many: int, seed: int) -> tuple[Floats, float]:
+    """Logarithms of the counts' probabilities, and the sd of their sum, by masses one by one."""
+    rng = np.random.default_rng(seed)
     whole, late_s = divmod(TRUTH[4], PERIOD_S)
-    x = recording.position[0] + COUNT * rng.uniform(-0.5, 0.5, many)
+    x = counts.position[0] + counts.unit * rng.uniform(-0.5, 0.5, many)
     v, white = np.zeros(many), np.zeros(many)
     likely, left = [0.0], []
-    for k in range(len(recording.position) - 1):
+    for k in range(len(counts.position) - 1):
         for ago, span_s in ((int(whole) + 1, late_s), (int(whole), PERIOD_S - late_s)):
             if ago == int(whole):
                 white = FORCE_SD * rng.standard_normal(many)
-            pull = (recording.force[k - ago] if k >= ago else 0.0) - TRUTH[3] + white
+            pull = (counts.command[k - ago] if k >= ago else 0.0) - TRUTH[3] + white
             x, v = moved(x, v, pull, TRUTH, span_s)
-        near = np.abs(x - recording.position[k + 1]) <= 0.5 * COUNT
+        near = np.abs(x - counts.position[k + 1]) <= 0.5 * counts.unit
         likely.append(np.log(np.mean(near)))
         left.append((1 - np.mean(near)) / np.sum(near))
         drawn = rng.choice(np.flatnonzero(near), many)
         x, v, white = x[drawn], v[drawn], white[drawn]
-    # The mass begins at rest here, and at any velocity there: that is soon forgotten.
-    apart = (found - np.array(likely))[20:]
     # What drawing so many adds to the sum, from sample to sample, with what they hand on.
-    by_chance = 2 * np.sqrt(np.sum(left))
+    return np.array(likely), 2 * float(np.sqrt(np.sum(left)))
+
+
+def test_probabilities_are_those_of_many_masses() -> None:
+    """Beside particles, each a mass of its own; friction holds some of them for a while."""
+    counts = counts_of(looped(0.3, seed=3))
+    likely, by_chance = among_particles(counts, 40_000, seed=4)
+    # The mass begins at rest here, and at any velocity there: that is soon forgotten.
+    apart = (counts.after(TRUTH, FORCE_SD).likely - likely)[20:]
     assert abs(np.sum(apart)) < 4 * by_chance + 0.01 * len(apart)
     assert np.sqrt(np.mean(apart**2)) < 0.1
+
+
+def test_probabilities_of_a_mass_that_crawls_are_those_of_many() -> None:
+    """Held at every third sample or so, and a third of a count moves it within one."""
+    counts = counts_of(crawling(400, seed=1, count=4e-7), unit=4e-7, cells=4)
+    likely, by_chance = among_particles(counts, 20_000, seed=2)
+    apart = (counts.after(TRUTH, FORCE_SD).likely - likely)[20:]
+    # With one normal for all that move one way the sum is five lower, and this is 0.12.
+    assert abs(np.sum(apart)) < 4 * by_chance + 0.005 * len(apart)
+    assert np.sqrt(np.mean(apart**2)) < 0.08
 
 
 def test_it_does_not_matter_how_a_delay_is_split() -> None:
