@@ -17,7 +17,9 @@ import bayeshaptic as bh
 from bayeshaptic.diagnosis.analysis import Analysis
 from bayeshaptic.errors import InputError
 from bayeshaptic.faq import explained
+from bayeshaptic.inference.population import settling
 from bayeshaptic.inference.population.configurations import Configurations, infer_configurations
+from bayeshaptic.inference.population.gaussian_likelihood import gaussian_likelihood
 from bayeshaptic.inference.population.infer import prior_moments, study_coordinates
 from bayeshaptic.inference.population.trend import Trend
 from bayeshaptic.inference.posterior import Posterior
@@ -155,6 +157,25 @@ def test_a_recording_that_is_described_where_it_is_not_makes_no_path() -> None:
     posteriors[2] = replace(strange, log_likelihood=likelihood)
     with pytest.raises(InputError, match="configuration 0.5 leaves too much open"):
         infer_configurations(posteriors, PLACES, seed=1)
+
+
+def test_a_recording_whose_description_ran_off_keeps_its_own(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One person's hand, 9 of its errors away, left the example study without held configurations:
+    people did with the description over its own draws, and configurations did not."""
+    posteriors = along(PLACES)
+    plain = infer_configurations(posteriors, PLACES, seed=1)
+    own = gaussian_likelihood(posteriors[2], study_coordinates(plain.model, posteriors))
+    gone = replace(own, mean=own.mean + 60 * np.sqrt(np.diag(own.covariance)))
+    monkeypatch.setattr(
+        settling, "linearised", lambda one, *_: gone if one is posteriors[2] else None
+    )
+    found = infer_configurations(posteriors, PLACES, seed=1)
+    place, rng = np.array([0.5]), np.random.default_rng(3)
+    number = plain.model.names.index("kc")
+    was, now = (np.log(one.predict(place, rng, 400)[:, 0, number]) for one in (plain, found))
+    assert abs(np.median(now) - np.median(was)) < 0.5 * was.std()
 
 
 def test_the_worst_configuration() -> None:

@@ -13,7 +13,7 @@ from bayeshaptic.inference.population.gaussian_likelihood import gaussian_likeli
 from bayeshaptic.inference.population.infer import common_model, prior_moments, study_coordinates
 from bayeshaptic.inference.population.reweighting import inside
 from bayeshaptic.inference.population.sampler import LevelChains, sample_level
-from bayeshaptic.inference.population.settling import astray, settled
+from bayeshaptic.inference.population.settling import astray, settled_nearby
 from bayeshaptic.inference.population.trend import Trend
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.models import Model
@@ -146,8 +146,9 @@ def infer_configurations(
     model = common_model(posteriors)
     here = study_coordinates(model, posteriors)
     mean, sd = prior_moments(model, here)
+    own = tuple(gaussian_likelihood(one, here) for one in posteriors)
     path = Trend(
-        tuple(gaussian_likelihood(one, here) for one in posteriors),
+        own,
         np.asarray(coordinate, float),
         np.isin(model.names, HAND),
         mean,
@@ -155,13 +156,13 @@ def infer_configurations(
     )
     tune, run, rest = np.random.SeedSequence(seed).spawn(3)
     report(0.0, "configurations: first look")
-    path = settled(path, posteriors, here, path.guess()[0])
+    path = settled_nearby(path, own, posteriors, here, path.guess()[0])
     first_steps = 200
     chains = sample_level(path, tune, steps=first_steps)
     report(0.5, "configurations: sampling")
     again = np.random.default_rng(rest)
     middle = np.median(chains.thinned(1000, again), axis=0)
-    path = settled(path, posteriors, here, middle)
+    path = settled_nearby(path, own, posteriors, here, middle)
     chains = sample_level(path, run, chains)
     lost = astray(path, posteriors, here, np.median(chains.thinned(1000, again), axis=0))
     if lost:

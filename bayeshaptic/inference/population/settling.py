@@ -72,12 +72,12 @@ def settled(level: L, posteriors: Sequence[Posterior], here: Coordinates, phi: F
 
 
 def settled_nearby(
-    level: Hierarchy,
+    level: L,
     own: Sequence[GaussianLikelihood],
     posteriors: Sequence[Posterior],
     here: Coordinates,
     phi: Floats,
-) -> Hierarchy:
+) -> L:
     """As `settled`, but recordings that went astray keep the descriptions over their own draws.
 
     Where they did not, seven people whose hands differ by 1.5 were said to differ by 30: the
