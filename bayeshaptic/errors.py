@@ -109,6 +109,11 @@ def nearest_or_all(word: str, known: Collection[str]) -> str:
     return nearest(word, known) or f"; there are {', '.join(known)}"
 
 
+def such(count: int, what: str) -> str:
+    """How often something was met: ``"1 such row"``, ``"3 such rows"``."""
+    return f"{count} such {what}{'' if count == 1 else 's'}"
+
+
 def shown(value: Any) -> str:
     """A value in a few words, for a message: short, and its type where that is the point."""
     if isinstance(value, str | Real | None) or isinstance(value, tuple | list) and len(value) < 4:

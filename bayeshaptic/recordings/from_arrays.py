@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bayeshaptic.arguments import at_the_door
-from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.errors import InputError, Notice, such
 from bayeshaptic.recordings.readers.numbers import as_numbers
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
@@ -242,7 +242,7 @@ def _signal(values: ArrayLike, what: str, where: str) -> NDArray[np.float64]:
     bad = np.flatnonzero(~np.isfinite(signal))
     if len(bad):
         raise InputError(
-            f"{where}: {what} is {signal[bad[0]]} in row {bad[0] + 1} ({len(bad)} such rows); "
+            f"{where}: {what} is {signal[bad[0]]} in row {bad[0] + 1} ({such(len(bad), 'row')}); "
             "fill them in, or read a part without them, with --rows A:B",
             topic="rows",
         )

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.columns import (
     FORCES,
@@ -79,6 +81,7 @@ def recorded(path: Path, arrays: Arrays, said: Said) -> Recording:
     if followed is not None:
         signals[REFERENCE] = followed[0]
     signals = said.cut.apply(signals, said.period_s, path)
+    _refuse_clocks_of_their_own(signals["force"], signals[position], path)
     kind = said.kind
     known = units[position] is not None or units[force] in ("N", "Nm")
     if kind is None and not known and force in mapping and position in mapping:
@@ -102,6 +105,18 @@ def recorded(path: Path, arrays: Arrays, said: Said) -> Recording:
     if units[force] is None and force in mapping:
         notices = (*notices, *_of_volts(force, mapping[force], recording.force_unit))
     return replace(recording, notices=recording.notices + notices)
+
+
+def _refuse_clocks_of_their_own(force: Floats, position: Floats, path: Path) -> None:
+    """Refuse signals that alternate, as two topics in one table: what belongs together is open."""
+    one, other = np.isfinite(force), np.isfinite(position)
+    if one.any() and other.any() and len(one) == len(other) and not (one & other).any():
+        raise InputError(
+            f"{path}: no row has both the force and the position ({one.sum()} rows have the one, "
+            f"{other.sum()} the other), as where two logs are merged by their time; write a row "
+            "for each sampling period, with the force and the position that was read for it",
+            topic="rows",
+        )
 
 
 def _of_volts(role: str, force: Column, unit: str) -> tuple[Notice, ...]:

@@ -19,6 +19,7 @@ from every_format import WRITERS, mapping_of, write_mat5
 from scipy.signal import lfilter
 
 from bayeshaptic.errors import InputError
+from bayeshaptic.faq import explained
 from bayeshaptic.recordings import (
     Reader,
     Recording,
@@ -190,6 +191,34 @@ def test_commas_between_thousands_are_no_decimal_ones(tmp_path: Path, name: str)
     path.write_text(THOUSANDS[name], encoding="utf-8")
     with pytest.raises(InputError, match="'q': thousands separators .* in row 1; write the num"):
         read_recording(path, "time=t,force=u,position=q[um]")
+
+
+def test_points_between_thousands_are_shown_as_they_stand(tmp_path: Path) -> None:
+    """The message had the file's decimal comma as a second point: "'-1.080.16' in row 3"."""
+    path = tmp_path / "a.csv"
+    path.write_text("t;u;q\n0,000;0,5;-5,25\n0,001;1,5;12,5\n0,002;0,5;-1.080,16\n")
+    with pytest.raises(InputError, match=r"'q': thousands separators \('-1.080,16'\) in row 3"):
+        read_recording(path, "time=t,force=u,position=q[um]")
+
+
+def test_two_topics_in_one_table_are_no_rows_with_both(tmp_path: Path) -> None:
+    """As a bag of messages is written out: it was told to fill in 1500 rows."""
+    path = tmp_path / "bag.csv"
+    rows = [f"{k},{k % 7}.5,\n{k}.05,,{k % 5}\n" for k in range(1500)]
+    path.write_text("t_ms,cmd,pos\n" + "".join(rows), encoding="utf-8")
+    with pytest.raises(
+        InputError, match="no row has both .*1500 rows have the one, 1500"
+    ) as raised:
+        read_recording(path, "time=t_ms,force=cmd[N],position=pos[mm]")
+    assert "explain rows" in explained(raised.value)
+
+
+def test_text_in_a_column_is_explained_as_a_row(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("time_s,force_n,position_m\n0,1,2\n0.001,ERR,3\n0.002,2,1\n")
+    with pytest.raises(InputError, match="'ERR' is not a number in row 2") as raised:
+        read_recording(path)
+    assert "explain rows" in explained(raised.value)
 
 
 def test_points_and_commas_are_no_one_decimal_sign(tmp_path: Path) -> None:
@@ -402,7 +431,7 @@ def test_arrays_in_memory() -> None:
         ),
         (
             {"period_s": 1e-3, "force": np.ma.array(FORCE, mask=np.arange(N) == 6)},
-            r"force is nan in row 7 \(1 such rows\)",
+            r"force is nan in row 7 \(1 such row\)",
         ),
         (
             {"period_s": 1e-3, "encoder_resolution": -1.0},

@@ -84,7 +84,7 @@ WRONG = {
     "about 1 sample.* missing after row 40 .*such places.*too few .* a logger that keeps up": drop(
         EVEN, 40, *(100 + np.flatnonzero(RNG.random(N - 100) < 0.03))
     ),
-    "time does not advance from row 10 to row 11 .*1 such places": replaced(10, EVEN[9]),
+    "time does not advance from row 10 to row 11 .*1 such place": replaced(10, EVEN[9]),
     "time does not advance from row 5 to row 6": replaced(5, 0.001),
     "4 rows have the time of the row before them, the first is row 9 .*twice": np.sort(
         np.append(EVEN, EVEN[[7, 50, 51, 300]])

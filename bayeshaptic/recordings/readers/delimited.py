@@ -74,12 +74,13 @@ def read_delimited(path: Path) -> Arrays:
         str(path),
     )
     lines = lines[layout.first :]
-    if separator != "," and any("," in line for _, line in lines):
-        rows = (_fields(line, separator) for _, line in lines)
-        if _comma_is_decimal(rows, any("." in line for _, line in lines)):
-            lines = [(number, line.replace(",", ".")) for number, line in lines]
+    texts = [line for _, line in lines]
+    if separator != "," and any("," in line for line in texts):
+        rows = (_fields(line, separator) for line in texts)
+        if _comma_is_decimal(rows, any("." in line for line in texts)):
+            texts = [line.replace(",", ".") for line in texts]
     names = layout.names
-    return _numbers(lines, separator, names) or _mixed(path, lines, separator, names)
+    return _numbers(texts, separator, names) or _mixed(path, lines, separator, names)
 
 
 def _text(path: Path) -> str:
@@ -143,12 +144,10 @@ def _fields(line: str, separator: str | None) -> list[str]:
     return [field.strip() for field in (rows[0] if rows else [])]
 
 
-def _numbers(lines: Lines, separator: str | None, names: list[str]) -> Arrays | None:
+def _numbers(lines: list[str], separator: str | None, names: list[str]) -> Arrays | None:
     """The fast way, for tables of nothing but numbers."""
     try:
-        table = np.loadtxt(
-            [line for _, line in lines], delimiter=separator, ndmin=2, quotechar='"', comments=None
-        )
+        table = np.loadtxt(lines, delimiter=separator, ndmin=2, quotechar='"', comments=None)
     except ValueError:
         return None
     if table.shape[1] != len(names):

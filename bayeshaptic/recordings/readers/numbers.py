@@ -14,6 +14,8 @@ from bayeshaptic.errors import InputError
 NO_NUMBERS = "no real numbers"
 # What may be a number whose thousands are parted.
 THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
+# The same where the comma is the decimal sign; without a comma it may be a decimal point.
+_THOUSANDS_BY_POINTS = re.compile(r"[-+]?[1-9]\d{0,2}((\.\d{3})+,\d*|(\.\d{3}){2,})")
 
 
 def as_numbers(values: NDArray[Any], where: str) -> NDArray[np.float64]:
@@ -27,14 +29,19 @@ def as_numbers(values: NDArray[Any], where: str) -> NDArray[np.float64]:
     try:
         return np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
-        row, text = next((i, v) for i, v in enumerate(values, start=1) if not _is_number(v))
+        rows = [(i, v) for i, v in enumerate(values, start=1) if not _is_number(v)]
+        row, text = rows[0]
+    if not THOUSANDS.fullmatch(str(text)):
+        # Of a column with decimal commas what is no number with them either is what keeps it text.
+        odd = (one for one in rows if not _is_number(str(one[1]).replace(",", ".")))
+        row, text = next(odd, rows[0])
     if text == NO_NUMBERS:
         raise InputError(f"{where} is there, but holds {text}; save it as such")
     what = f"'{text}' is not a number" if str(text).strip() else "there is no number"
     cure = "write all with one decimal sign" if "," in str(text) else "mend or remove the row"
-    if THOUSANDS.fullmatch(str(text)):
+    if THOUSANDS.fullmatch(str(text)) or _THOUSANDS_BY_POINTS.fullmatch(str(text)):
         what, cure = f"thousands separators ('{text}')", "write the numbers without them"
-    raise InputError(f"{where}: {what} in row {row}; {cure}")
+    raise InputError(f"{where}: {what} in row {row}; {cure}", topic="rows")
 
 
 def _is_number(value: object) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.errors import InputError, Notice, such
 from bayeshaptic.types import Floats
 
 # Standard deviation of the time steps over the period beyond which samples are not evenly spaced:
@@ -137,7 +137,7 @@ def _from_stamps(time_s: Floats, where: str) -> Timing:
     if len(back):
         raise InputError(
             f"{where}: time does not advance from row {back[0] + 1} to row {back[0] + 2} "
-            f"({time_s[back[0]]:.9g} s, {time_s[back[0] + 1]:.9g} s; {len(back)} such places); "
+            f"({time_s[back[0]]:.9g} s, {time_s[back[0] + 1]:.9g} s; {such(len(back), 'place')}); "
             "cut the recording there, or give the period with --period-s if only the stamps are "
             "wrong"
         )
@@ -245,8 +245,8 @@ def _with_gaps(time_s: Floats, gaps: NDArray[np.intp], period: float, where: str
         raise InputError(
             f"{where}: about {steps[first] / period - 1:.0f} samples are missing after row "
             f"{first + 1} (a step of {steps[first]:.6g} s where the period is {period:.6g} s; "
-            f"{len(gaps)} such places); the longest part without a gap is rows {start} to {end}: "
-            f"{cure}"
+            f"{such(len(gaps), 'place')}); the longest part without a gap is rows {start} to "
+            f"{end}: {cure}"
         )
     rows = np.arange(len(time_s)) + np.cumsum(lost)
     even = _from_stamps(np.interp(np.arange(rows[-1] + 1), rows, time_s), where)
