@@ -31,7 +31,7 @@ from bayeshaptic.commands.streams import (
     write_what_can_be,
 )
 from bayeshaptic.commands.talk import complain
-from bayeshaptic.errors import InputError, describe, warned
+from bayeshaptic.errors import InputError, describe, nearest, warned
 from bayeshaptic.faq import explained
 from bayeshaptic.jobs.own_process import collect_garbage_rarely, draw_by_defaults
 from bayeshaptic.threads import one_thread_from_the_start
@@ -66,6 +66,19 @@ class _Parser(argparse.ArgumentParser):
         super().exit(status, message)
 
 
+class _CommandParser(_Parser):
+    """The parser of one command, which says itself what it does not know."""
+
+    def parse_known_args(self, args=None, namespace=None):  # type: ignore[no-untyped-def, override]
+        """As that of `argparse`, but nothing unknown is left for the parser above."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            option = unknown[0].partition("=")[0]
+            near = nearest(option, self._option_string_actions) if option[:1] == "-" else ""
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{near}")
+        return found, unknown
+
+
 def build_parser() -> argparse.ArgumentParser:
     """The whole command line, one subparser a module of `bayeshaptic.commands`."""
     parser = _Parser(
@@ -75,7 +88,9 @@ def build_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"bayeshaptic {__version__}")
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND")
+    commands = parser.add_subparsers(
+        title="commands", metavar="COMMAND", parser_class=_CommandParser
+    )
     for command in COMMANDS:
         subparser = commands.add_parser(
             command.NAME,
