@@ -45,12 +45,13 @@ class Scale:
         return minus(text if len(text) <= _LONGEST else f"{scaled:.1e}")
 
     def with_error(self, value: float | None, sd: float | None) -> str:
-        """A number and its error with as many decimals: ``"0.590 ± 0.020"``; alone without one."""
+        """A number and its error, rounded alike: ``"0.590 ± 0.020"``, ``"220 ± 320"``; or alone."""
         number = self.number(value, sd, least=0)
         if value is None or not sd or not math.isfinite(sd):
             return number
-        places = len(number.partition(".")[2])
-        error = f"{sd * self.factor:.{places}f}"
+        places, error_sd = len(number.partition(".")[2]), sd * self.factor
+        decimals = min(places, _decimals(value * self.factor, error_sd, 3, 0))
+        error = f"{round(error_sd, decimals):.{places}f}"
         return f"{number} ± {error}" if float(error) else number
 
     def quantity(self, value: float | None, sd: float | None = None, digits: int = 3) -> str:

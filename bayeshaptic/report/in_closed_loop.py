@@ -56,8 +56,8 @@ def _through_reference(analysis: Analysis, verdict: str | None) -> list[str]:
     # Of 48 loops without such a force five are read so, and one loses its stiffness for this.
     if any(notice.topic == AGAINST for notice in analysis.notices):
         found.append(
-            "where all lines are fitted a force that is not linear acts, which what the reference "
-            "moves does not show"
+            "a fit to all that moves finds a force that is not linear, which a fit to what the "
+            "reference moves does not show"
         )
     if any(notice.topic == VALLEY for notice in analysis.notices):
         found.append("a vibration mode elsewhere explains what the reference moves as well")

@@ -10,7 +10,7 @@ _OFTEN = {2: "twice", 3: "three times"}
 
 def listed(parts: Iterable[str]) -> str:
     """ "a", "a and b", "a, b and c"; what comes several times once: "a (twice) and b"."""
-    counts = Counter(parts)
+    counts = Counter(iter(parts))  # of a mapping its keys
     *first, last = [_counted(part, count) for part, count in counts.items()] or [""]
     return f"{', '.join(first)} and {last}" if first else last
 

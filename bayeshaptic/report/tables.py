@@ -77,7 +77,10 @@ def _shrinkage(prior: Prior, low: float, high: float) -> str:
     if not (np.isfinite(wide) and wide > 0):
         return _DASH
     share = 100 * (high - low) / wide
-    return "over 100 %" if share > 100 else f"{pure(share, 2)} %"
+    if share > 100:
+        return "over 100 %"
+    least = 0.01
+    return f"{pure(share, 2)} %" if share >= least else f"under {least} %"
 
 
 def limit(analysis: Analysis) -> Rows:

@@ -130,7 +130,7 @@ def delay(analysis: Analysis) -> str:
             f"{quantity(model.fixed[_DELAY], 's')}. If it is not, the limit's interval is too "
             "narrow; give --delay-sd-s."
         )
-    column = analysis.posterior.draws[:, model.names.index(_DELAY)]
+    column = analysis.stated.draws[:, model.names.index(_DELAY)]  # as in the table of parameters
     low, high = (float(v) for v in np.quantile(column, (0.05, 0.95)))
     return (
         "The loop delay beyond the hold is uncertain and was estimated with the other parameters: "
@@ -260,6 +260,11 @@ def response_caption(result: Result) -> str:
         ", and the model's 90 % band. The band is often narrower than the line; the third panel "
         "shows it enlarged."
     )
+    if result.analysis.etfe.direct:
+        text += (
+            " Feedback biases the points, most where the coherence is low; the model is fitted so "
+            "that it is not biased, and need not go through them."
+        )
     closed = result.closed
     if closed is not None and closed.effects and closed.force is None:
         text += " Dashed: the model as declared, before what it lacked was added" + (

@@ -242,14 +242,16 @@ def _caveat(fits: list[LocalFit], side: Floats, lowest: float, unit: str) -> str
         (near[1:-1] <= np.minimum(near[:-2], near[2:])) & (near[1:-1] < _NEAR)
     )
     places = [
-        (-fits[n].inverse.real, fits[n].centre_hz)
+        (-fits[n].inverse.real, fits[n].centre_hz, fits[n].relative_sd * abs(fits[n].inverse))
         for n in (*doubtful, *dips.tolist())
         if 0 < -fits[n].inverse.real < lowest
     ]
     if not places:
         return None
-    stiffness, frequency = min(places)
+    stiffness, frequency, sd = min(places)
+    if stiffness < sd:
+        return f"near {frequency:.3g} Hz noise hides the phase, and whether a limit is there"
     return (
-        f"near {frequency:.3g} Hz the phase is nearer to -180 degrees than its noise; if it "
-        f"crosses there, the limit is {float(f'{stiffness:.3g}'):,g} {unit}"
+        f"near {frequency:.3g} Hz the phase is nearer to \N{MINUS SIGN}180 degrees than its "
+        f"noise; if it crosses there, the limit is {float(f'{stiffness:.3g}'):,g} {unit}"
     )

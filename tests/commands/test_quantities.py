@@ -62,6 +62,14 @@ def test_a_zero_without_an_error_is_a_zero() -> None:
     assert scale(0.0, "N s/m").with_error(0.0, float("nan")) == "0"
 
 
+def test_an_error_is_rounded_as_its_number_is() -> None:
+    """A mass was "220000 ± 315550"."""
+    row = scale(1.0, "kg")
+    assert row.with_error(222_345.0, 315_550.0) == "220000 ± 320000"
+    assert row.with_error(99.6, 152.3) == "100 ± 150"
+    assert row.with_error(0.5898, 0.0204) == "0.590 ± 0.020"
+
+
 def test_a_row_has_one_scale() -> None:
     row = scale([950.0, 12_000.0], "N/m")
     assert [row.number(v, 30.0) for v in (950.0, 12_000.0)] == ["0.950", "12.000"]

@@ -37,6 +37,7 @@ from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.study_file import read_study
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop.words import in_short
+from bayeshaptic.report.numbers.hidden import moves
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.stability.mixed import mixed
@@ -263,7 +264,9 @@ def test_what_is_likelier_than_not_is_said_beside_that_nothing_was_found(
     hidden = closed.analysis.hidden
     assert hidden is not None
     known = "The model as declared explains the recording to within its noise."
-    for share, said in ((0.4, known), (0.9, f"{known[:-1]}; actuator lag is likely all the same.")):
+    (lag,) = (one for one in hidden.effects if one.name == "actuator_lag")
+    likely = f"{known[:-1]}; an actuator lag is likely all the same (and allowed for: {moves(lag)}"
+    for share, said in ((0.4, known), (0.9, f"{likely} of the limit).")):
         effects = tuple(
             replace(one, probability=share if one.name == "actuator_lag" else 0.1)
             for one in hidden.effects

@@ -11,6 +11,8 @@ from plain_stepping import step_through
 
 from bayeshaptic.diagnosis.feedback.inverse_dynamics import inverse_dynamics
 from bayeshaptic.diagnosis.periodic.forces import force_candidates
+from bayeshaptic.diagnosis.residuals.columns import force_test
+from bayeshaptic.diagnosis.residuals.residual import ForceSeen
 from bayeshaptic.effects import laws, registry
 from bayeshaptic.effects.library import effect_class, effects
 from bayeshaptic.effects.nonlinear.internal_force import (
@@ -130,3 +132,12 @@ def test_a_lag_that_nobody_knows_is_in_the_errors_of_inverse_dynamics() -> None:
     for name, truth in (("mass", mass), ("damping", damping)):
         value, sd = found[name]
         assert abs(value - truth) < 2 * sd < truth, name
+
+
+def test_a_force_elsewhere_than_at_the_motor_is_named_in_words() -> None:
+    """A warning told of "a force like clipped stretch", and of sign(v2)."""
+    seen = ForceSeen(1.0, 0.1, 1.0)
+    said = {name: force_test(name, 5.0, seen).text for name in laws.tested()}
+    assert said["sign(v)"].startswith("a force like sign(v) stands 5.0")
+    assert said["sign(v2)"].startswith("a force like dry friction at the load stands")
+    assert said["clipped stretch"].startswith("a force like a gap in the connection stands")

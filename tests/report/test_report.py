@@ -19,17 +19,20 @@ from fake_analysis import CASES, FEEDBACK, FakeAnalysis, fake_analysis, fake_clo
 import bayeshaptic
 from bayeshaptic.devices import load_device
 from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.quantities import interval
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.report import write, write_report
 from bayeshaptic.report.figures.pictures import PICTURES, draw_pictures
 from bayeshaptic.report.figures.style import Drawn
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.numbers.estimates import least_squares_limit, witnesses
 from bayeshaptic.report.page.answer import FARED, FARED_HIDDEN
+from bayeshaptic.report.page.frame import template
 from bayeshaptic.report.page.lights import lights
 from bayeshaptic.report.page.methods import bibtex, methods
 from bayeshaptic.report.page.next_step import next_steps
 from bayeshaptic.report.tables import comparison, parameters, safe
-from bayeshaptic.report.words import agreement, hump, misfit
+from bayeshaptic.report.words import agreement, delay, hump, misfit, response_caption
 
 WALLS = ("limits_curve", "limits_kb", "guidance_shares", "guidance_sweeps")
 NAMES = (*(picture.name for picture in PICTURES), *WALLS)
@@ -478,10 +481,47 @@ def test_the_page_as_a_picture_and_on_paper(tmp_path: Path) -> None:
     assert 5 <= pages <= 14
 
 
+def test_the_delay_is_said_as_in_the_table_of_parameters() -> None:
+    """Where intervals were widened: 247 to 290 µs stood below a table with 0 to 750."""
+    analysis = fake_analysis("rigid")
+    posterior = analysis.posterior
+    middle = posterior.draws.mean(axis=0)
+    wide = replace(posterior, chains=middle + 3 * (posterior.chains - middle))
+    low, high = np.quantile(wide.draws[:, wide.names.index("delay_s")], (0.05, 0.95))
+    said = delay(FakeAnalysis(**{**vars(analysis), "widened": wide}))
+    assert interval(low, high, "s") in said and said != delay(analysis)
+
+
+def test_what_is_narrow_beyond_reading_is_said_so() -> None:
+    """A mass had "3.6e-05 %" of the prior's width."""
+    rows = parameters(fake_analysis("free", None, spread=1e-7))
+    assert "under 0.01 %" in {row.shrinkage for row in rows}
+    assert not any("e" in row.shrinkage.replace("under", "") for row in rows)
+
+
+def test_a_biased_response_is_not_said_to_be_what_was_fitted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Points 30 dB beside the model stood under a light that said "only noise is left"."""
+    analysis = fake_analysis("free")
+    assert "Feedback biases the points" not in response_caption(analysis)
+    monkeypatch.setattr(Etfe, "direct", True)
+    assert "Feedback biases the points" in response_caption(analysis)
+
+
+def test_a_command_is_typeset_as_one() -> None:
+    """One option of it was in another font than the rest."""
+    command = "bayeshaptic report a.csv --quiet"
+    page = template("report.jinja").environment.from_string(
+        "{% import 'macros.jinja' as m %}{{ m.facts((('Command', command), ('Seed', '0'))) }}"
+    )
+    assert f"<dd><code>{command}</code></dd>" in page.render(command=command)
+
+
 def test_what_the_measured_crossing_may_hide_stands_beside_it() -> None:
     analysis = fake_analysis("rigid")
     own = analysis.etfe_limit
-    said = "near 8.9 Hz the phase is nearer to -180 degrees than its noise"
+    said = "near 8.9 Hz the phase is nearer to \N{MINUS SIGN}180 degrees than its noise"
     plain = [w.remark for w in witnesses(analysis) if w.key == "etfe"]
     analysis.etfe_limit = replace(own, caveat=said)
     (remark,) = [w.remark for w in witnesses(analysis) if w.key == "etfe"]

@@ -187,7 +187,7 @@ def test_consistent_says_that_there_is_nothing() -> None:
 def test_unexplained_says_class_place_trials_widening_and_what_next(family: str) -> None:
     closed = fake_closed("unexplained", family)
     text = " ".join(verdict(closed))
-    assert f"Its class is {family}" in text
+    assert f"Its class is {family}" in text and "times)" not in text
     assert ("around 87" in text) == (family == "linear")
     assert "Tried without success" in text
     assert "was widened" in text
@@ -200,6 +200,9 @@ def test_unexplained_says_class_place_trials_widening_and_what_next(family: str)
         "time-varying": ("untrusted", "not the same at the end"),
     }[family]
     assert head.status == status and said in head.sentence
+    # A page that recommends nothing tells nobody to use a number of it.
+    assert ("Use its lower end" in text) == (status != "untrusted")
+    assert ("for comparison only" in text) == (status == "untrusted")
 
 
 def test_no_law_of_friction_is_said_to_fail_that_was_not_asked() -> None:

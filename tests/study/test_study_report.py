@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import cache, partial
 from html import unescape
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -19,6 +20,7 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.report.figures.drawing.look import own_look
 from bayeshaptic.report.figures.study.pictures import STUDY_PICTURES, draw_study_pictures
 from bayeshaptic.report.figures.style import called
+from bayeshaptic.report.figures.walls.curve import _curves
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.study import write as study_report
 from bayeshaptic.report.study.headline import study_headline
@@ -146,6 +148,15 @@ def test_figures_have_room_for_every_name() -> None:
         assert set(draw_study_pictures(named)) == {"study_limit", "study_people"}
     assert called(longest).startswith("user xxx") and len(called(longest)) < 50
     assert called("user ü") == "user ü"
+
+
+def test_a_predicted_configuration_is_called_so_beside_its_curve() -> None:
+    """Its name was "configuration 0.875 (…ted), nobody holds it"."""
+    found = study("whole")
+    label = "configuration 0.875 (predicted), nobody holds it"
+    cases = tuple(replace(case, label=label) for case in found.cases[:2])
+    curves = _curves(SimpleNamespace(cases=cases, samples=cases[0].limit.samples))
+    assert label in [name for name, _ in curves]
 
 
 def test_the_worst_case_decides_and_is_named() -> None:

@@ -62,8 +62,8 @@ def test_people_are_known_by_their_names_and_not_by_how_labels_begin() -> None:
     ("ways", "end"),
     [
         ((), "a person not yet seen holds it."),
-        ((0,), "holds it, in every configuration with nobody holding it, else in those recorded."),
-        ((1,), "in every configuration with somebody holding it, else in those recorded."),
+        ((0,), "holds it (every configuration with nobody holding it, else those recorded)."),
+        ((1,), "holds it (every configuration with somebody holding it, else those recorded)."),
         ((0, 1), "holds it, in every configuration."),
     ],
 )

@@ -51,7 +51,7 @@ class FakeAnalysis(SimpleNamespace):
     effect_names = ()
     analysis = measured = property(lambda self: self)
     declared = property(lambda self: self.limit)
-    stated = property(lambda self: self.posterior)
+    stated = property(lambda self: self.widened or self.posterior)
     moved_besides = property(lambda self: moved_besides(self.fit, self.etfe.unbroken))
     widened, sampled = None, True
 

@@ -16,7 +16,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_by_direct_method
 from bayeshaptic.recordings.signals.turns import hung
 
-AGAINST = "direct"  # the topic of what speaks against such a fit
+AGAINST = "closed-loop fit"  # the topic of what speaks against such a fit
 _WHATEVER = (
     "whatever controller made it: all lines of the spectrum are fitted, up to the Nyquist "
     "frequency, whose sum feedback does not bias. The measured response is biased then, and shown "

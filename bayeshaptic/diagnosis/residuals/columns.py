@@ -70,7 +70,11 @@ def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
 
 def force_test(name: str, score: float, seen: ForceSeen) -> Test:
     """The test for a force of a shape by its score."""
-    text = f"a force like {name} stands {score:.1f} standard deviations out of the noise"
+    shape, what = tested().get(name), f"a force like {name}"
+    # A formula of the motor's motion says itself what it is; of what is elsewhere the title does.
+    if shape is not None and not shape.title.startswith(("a force like", "a command")):
+        what = f"a force like {shape.title}"
+    text = f"{what} stands {score:.1f} standard deviations out of the noise"
     return Test(name, "nonlinear", score, thresholds.two_sided(), None, text, seen)
 
 

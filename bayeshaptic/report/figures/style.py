@@ -187,9 +187,11 @@ def short(name: str) -> str:
     return without_unit.replace("_", " ")
 
 
-def called(name: str) -> str:
-    """A name that a user gave, as a figure has room for it; tables have all of it."""
-    most = 44  # characters, half of the page's width
+def called(name: str, most: int = 44) -> str:
+    """A name that a user gave, as a figure has room for it; tables have all of it.
+
+    `most` characters are half of the page's width.
+    """
     half = most // 2 - 1
     return name if len(name) <= most else f"{name[:half]}…{name[-half:]}"
 

@@ -49,7 +49,8 @@ def largest(hidden: Hidden) -> str:
         return "Nothing that could hide here would move the limit by more than 0.005 dB."
     return (
         f"What counts most: {first.title}. It is there with a probability of "
-        f"{percent(first.probability)}, and then it is {size(first)} and moves the limit by "
+        f"{percent(first.probability)}, and then it is {size(first)} ({first.what}) and moves the "
+        "limit by "
         f"{moves(first)}.{ruled_out(first)} A longer recording, or one with more force, "
         "shrinks it as it does all the others."
     )

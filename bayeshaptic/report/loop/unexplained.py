@@ -8,6 +8,7 @@ from bayeshaptic.quantities import interval, pure, quantity
 from bayeshaptic.report.listed import listed
 from bayeshaptic.report.numbers.misfit import is_far_off
 from bayeshaptic.report.numbers.unstated import unstated
+from bayeshaptic.report.objections import why_none
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.closed import Closed
@@ -73,6 +74,8 @@ def _widened(closed: Closed) -> str:
     )
     if is_far_off(closed.analysis):
         return f"{text}. Neither is of use: so much is left that nothing follows from it."
+    if why_none(closed):
+        return f"{text}. That is for comparison only, for the reason given at the top of the page."
     return f"{text}. Use its lower end."
 
 

@@ -15,7 +15,7 @@ from bayeshaptic.report.loop import force_words
 from bayeshaptic.report.loop.change_words import error_change, limit_change, moved, noise_change
 from bayeshaptic.report.loop.motion_words import determined
 from bayeshaptic.report.loop.unexplained import remainder, worst
-from bayeshaptic.report.numbers.hidden import likely
+from bayeshaptic.report.numbers.hidden import likely, moves
 from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear
 
 if TYPE_CHECKING:
@@ -95,7 +95,10 @@ def in_short(closed: Closed) -> str:
         if misfit_is_clear(closed.analysis):
             return ""
         hiding = likely(closed.analysis)
-        but = "" if hiding is None else f"; {hiding.title} is likely all the same"
+        but = ""
+        if hiding is not None:
+            does = f"and allowed for: {moves(hiding)} of the limit"
+            but = f"; {_with_article(hiding.title)} is likely all the same ({does})"
         return f"The model as declared explains the recording to within its noise{but}."
     if not closed.effects:
         return ""

@@ -158,7 +158,7 @@ def _scope(study: StudyAnalysis) -> str:
     if along >= {not is_free(case.label, case.group) for case in study.cases}:
         return f"{text}, in every configuration"
     who = "somebody" if True in along else "nobody"
-    return f"{text}, in every configuration with {who} holding it, else in those recorded"
+    return f"{text} (every configuration with {who} holding it, else those recorded)"
 
 
 def what_binds(study: StudyAnalysis) -> str:

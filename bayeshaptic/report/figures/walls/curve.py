@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 LOWEST_RISK = 5e-4
 LOG_BEYOND = 4.0  # limits further apart than this factor are drawn on a logarithmic axis
 SHOWN = 6  # cases with a curve of their own
+_LONGEST = 52  # characters of a case's name: half of the page, and it stands there alone
 
 
 def draw(table: LimitTable) -> Figure:
@@ -73,7 +74,7 @@ def _curves(table: LimitTable) -> list[tuple[str, NDArray[Any]]]:
     if len(table.cases) == 1:
         return [(style.called(table.cases[0].label), table.cases[0].limit.samples)]
     order = sorted(table.cases, key=lambda case: case.limit.quantile(0.05))
-    own = [(style.called(case.label), case.limit.samples) for case in order[:SHOWN]]
+    own = [(style.called(case.label, _LONGEST), case.limit.samples) for case in order[:SHOWN]]
     return [("in every case", table.samples), *own]
 
 
