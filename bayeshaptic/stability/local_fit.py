@@ -120,6 +120,11 @@ class LocalFit:
         """Standard deviation of the real and of the imaginary part at the centre, over |G|."""
         return float(np.sqrt(self.covariance[0, 0].real / 2) / abs(self.coefficients[0]))
 
+    def covers(self, margin: float) -> bool:
+        """Whether the centre is among its data, or beside them by a share `margin` at most."""
+        low, high = self.low_hz / (1 + margin), self.high_hz * (1 + margin)
+        return low <= self.centre_hz <= high
+
     def draws(self, rng: np.random.Generator, count: int, frequency_hz: Floats) -> Complexes:
         """Draw 1/G from what the data leave open.
 

@@ -132,17 +132,22 @@ def test_the_phase_just_short_of_180_degrees_is_mentioned():
     """Within two standard deviations of -180 degrees, below the crossing that was read."""
     inverse = [-3 + 3j, -2 + 1j, -1.5 + 0.2j, -2 + 1j, -3 - 3j]
     fits = [
-        SimpleNamespace(inverse=v, centre_hz=hz, relative_sd=0.1)
+        SimpleNamespace(inverse=v, centre_hz=hz, covers=lambda margin: True)
         for v, hz in zip(inverse, range(5, 10), strict=True)
     ]
     near = _caveat(fits, np.array([30.0, 9, 1.5, 9, -30]), 2.4, "N/m")
     assert "near 7 Hz" in near and "1.5 N/m" in near
     assert _caveat(fits, np.array([30.0, 9, 3.5, 9, -30]), 2.4, "N/m") is None
     assert _caveat(fits, np.array([30.0, 9, 1.5, 9, -30]), 1.4, "N/m") is None
-    # A number that the noise alone makes is none: 420 N/m were said of a gain of 1000 kN/m.
-    fits[2] = SimpleNamespace(**{**vars(fits[2]), "relative_sd": 2.0})
-    hidden = _caveat(fits, np.array([30.0, 9, 1.5, 9, -30]), 2.4, "N/m")
-    assert "near 7 Hz noise hides the phase" in hidden and "N/m" not in hidden
+    # Far from all data no limit is told: 420 N/m were, of a gain of 1000 kN/m.
+    vars(fits[2])["covers"] = lambda margin: False
+    assert _caveat(fits, np.array([30.0, 9, 1.5, 9, -30]), 2.4, "N/m") is None
+
+
+def test_a_fit_covers_what_its_data_are_about():
+    etfe, _ = model_table("free", "lhifam", 0.02, low=4.0, high=200.0, seed=0, b2=8.5)
+    data = response_data(etfe)
+    assert local_fit(data, 50.0).covers(0.03) and not local_fit(data, 300.0).covers(0.03)
 
 
 def test_weak_stretches_join_their_neighbours():
