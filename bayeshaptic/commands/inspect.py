@@ -29,6 +29,7 @@ EXAMPLES = """\
   bayeshaptic inspect bench.mat
   bayeshaptic inspect bench.mat --png bench.png --write study.toml"""
 
+OUTSIDE = " (its recording is outside its folder: report it with --allow-outside, or move one)"
 _BARS = "▁▂▃▄▅▆▇█"
 
 
@@ -67,7 +68,9 @@ def run(arguments: argparse.Namespace) -> int:
         mapping = asked(found) if ask else found.mapping
         text = study_text(found, arguments.write, mapping)
         write_whole(arguments.write, text)
-        print(f"study: {arguments.write}")
+        file, folder = resolved(found.path), resolved(arguments.write).parent
+        beyond = "" if file.is_relative_to(folder) else OUTSIDE
+        print(f"study: {arguments.write}{beyond}")
     return 0
 
 

@@ -365,3 +365,13 @@ def test_the_range_of_a_long_recording_is_that_of_all_of_it(tmp_path: Path) -> N
     assert facts["time_s"].high == time[-1] and facts["time_s"].samples == count
     assert (facts["force_n"].low, facts["force_n"].high) == (-5.0, 7.0)
     assert facts["force_n"].missing == 1
+
+
+def test_a_study_of_a_recording_elsewhere_says_how_it_is_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path / "a.csv", "t,u,y,v")
+    (tmp_path / "studies").mkdir()
+    for study, said in ((tmp_path / "s.toml", False), (tmp_path / "studies" / "s.toml", True)):
+        assert cli.main(["inspect", str(path), "--write", str(study)]) == 0
+        assert ("--allow-outside" in capsys.readouterr().out) == said

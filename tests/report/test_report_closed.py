@@ -28,6 +28,7 @@ from bayeshaptic.report import summary
 from bayeshaptic.report.assumptions import assumptions
 from bayeshaptic.report.figures.loop import stiffness as loop_stiffness
 from bayeshaptic.report.figures.pictures import LOOP_PICTURES
+from bayeshaptic.report.figures.response import draw as draw_response
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.listed import listed
 from bayeshaptic.report.loop.tables import (
@@ -82,6 +83,9 @@ def test_a_response_with_a_force_taken_off_is_not_called_as_measured() -> None:
     (said,) = (text for text in headline(closed).details if "puts the limit at" in text)
     assert "after dry (Coulomb) friction at the motor was taken off it" in said
     assert "without a model" not in said
+    labels = draw_response(closed).axes[0].get_legend_handles_labels()[1]
+    assert "as measured" in labels and "measured, corrected, ± 2 sd" in labels
+    assert "measured, ± 2 sd" not in labels
     bare = headline(fake_analysis("grasped", misfit=13.0))
     assert any("itself, without a model, puts the limit at" in text for text in bare.details)
 

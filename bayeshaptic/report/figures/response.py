@@ -55,9 +55,11 @@ def draw_on(panels: Sequence[Axes], result: Result) -> None:
     # Beyond 100 % the noise has taken over, and a symmetric bar in dB says nothing.
     error = 2 * np.clip(relative / np.sqrt(2), 0.0, 1.0)
     gain_error, phase_error = 20 / np.log(10) * error, np.degrees(error)
-    points = _points(gain, etfe, etfe.gain_db, gain_error, "measured, ± 2 sd")
+    corrected = bool(correction(result))
+    label = "measured, corrected, ± 2 sd" if corrected else "measured, ± 2 sd"
+    points = _points(gain, etfe, etfe.gain_db, gain_error, label)
     points += _points(phase, etfe, measured, phase_error)
-    if correction(result):
+    if corrected:
         style.layer(points, "after")
     _note(gain, etfe, etfe.gain_db, gain_error, "dB", band, band.gain_db if band else ())
     _note(
