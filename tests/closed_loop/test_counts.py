@@ -9,7 +9,12 @@ from scipy.stats import chi2, norm, truncnorm
 from bayeshaptic.inference.time_domain.counts import cut_normals
 from bayeshaptic.inference.time_domain.counts.filter import Counts
 from bayeshaptic.inference.time_domain.counts.fit import by_counts
-from bayeshaptic.inference.time_domain.counts.likeliest import about, exactly
+from bayeshaptic.inference.time_domain.counts.likeliest import (
+    Likeliest,
+    about,
+    among,
+    exactly,
+)
 from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.recordings import join_recordings, recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
@@ -179,6 +184,27 @@ def test_values_are_as_far_off_as_they_are_said_to_be() -> None:
     square = np.sum(np.square(far))
     # Their covariance is known to a tenth or so, and the table of normals is none of the truth.
     assert chi2.ppf(1e-4, 30) < square < 1.3 * chi2.isf(1e-4, 30)
+
+
+def test_a_delay_that_may_be_in_two_places_is_as_wide_as_both() -> None:
+    """As many draws of two normals, each weighted by its likelihood and volume, about the first."""
+    rng = np.random.default_rng(8)
+    counts = counts_of(looped(0.1, seed=9))
+    points = np.zeros((2, 6))
+    points[1, 4] = 3.0
+    likely = np.array([-10.0, -11.0])
+    wide = np.array([1.0, 0.25])
+    places = [
+        Likeliest(counts, point, one, np.zeros((0, 6)), scale * np.eye(6), True)
+        for point, one, scale in zip(points, likely, wide, strict=True)
+    ]
+    found = among(places[0], places).covariance
+    mass = np.exp(likely) * wide**3  # the square root of the determinant
+    at = rng.choice(2, 200_000, p=mass / mass.sum())
+    drawn = points[at] + rng.standard_normal((len(at), 6))  # as wide as the first everywhere
+    # A variance of n draws is known to sqrt(2/n); here with the tails of a mixture.
+    np.testing.assert_allclose(found, drawn.T @ drawn / len(at), atol=0.05)
+    assert among(places[0], places[:1]).covariance == pytest.approx(np.eye(6))
 
 
 def test_what_a_controller_makes_of_counts_is_no_noise() -> None:

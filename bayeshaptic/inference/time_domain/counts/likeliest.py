@@ -32,6 +32,8 @@ _RIDGE = 1e-10  # of the information: what two values share that nothing tells a
 _ABOUT = 0.1  # log likelihood that a step gains at the end, where it is only looked for
 _SETTLED = 0.03  # the same, where it is found
 _AWAY = 2.0  # standard deviations off, where the likelihood is looked at
+_PLACES = 2  # other delays from which the likeliest is looked for: each takes a third of the time
+_SAME = 0.1  # of a period, within which nothing else is looked for
 _AGAIN = 3  # ascents from what was found there: after them nothing has settled
 
 
@@ -78,21 +80,21 @@ def exactly(near: Likeliest, delay_s: float, delay_sd: float) -> Likeliest | Non
     """The likeliest values, with as many cells as it takes, and their covariance.
 
     A delay may be likeliest in more than one place: others are tried, up to two `delay_sd` from
-    `delay_s`.  None where no cells are enough: little but counts disturbs the mass then, and where
-    in a count it is lies between edges that no few normals describe.  None, too, where it would
-    take minutes.
+    `delay_s`, and the covariance reaches as far as they are likely.  None where no cells are
+    enough: little but counts disturbs the mass then, and where in a count it is lies between edges
+    that no few normals describe.  None, too, where it would take minutes.
     """
-    other = _elsewhere(near, delay_s, delay_sd)
-    near = near if other is None or other.likely < near.likely else other
-    cells = _enough(near)
+    places = _places(near, delay_s, delay_sd)
+    first = max(places, key=lambda place: place.likely)
+    cells = _enough(first)
     if cells is None:
         return None
-    counts = replace(near.counts, cells=cells)
-    found = _ascend(counts, near.point, _SETTLED)
+    counts = replace(first.counts, cells=cells)
+    found = _ascend(counts, first.point, _SETTLED)
     for _ in range(_AGAIN):
         covariance, highest = _fallen(found)
         if _likely(counts, highest) < found.likely + _SETTLED:
-            return _held(replace(found, covariance=covariance))
+            return among(_held(replace(found, covariance=covariance)), places)
         found = _ascend(counts, highest, _SETTLED)
     return replace(found, settled=False)
 
@@ -217,12 +219,11 @@ def _moved(point: Floats, slopes: Floats, damped: float) -> Floats:
     return np.asarray(moved)
 
 
-def _elsewhere(found: Likeliest, delay_s: float, delay_sd: float) -> Likeliest | None:
-    """The likeliest values from another delay, the others moved along with it; None where none."""
+def _places(found: Likeliest, delay_s: float, delay_sd: float) -> list[Likeliest]:
+    """`found`, and the likeliest values from the best of other delays, the others moved along."""
     inner = found.slopes[:, :DELAY].T @ found.slopes
     along = np.linalg.lstsq(inner[:, :DELAY], inner[:, DELAY], rcond=None)[0]
     counts = found.counts
-    near = 0.1  # of a period, within which nothing else is looked for
     wide = delay_s + delay_sd * np.linspace(-2, 2, 9)
     close = found.point[DELAY] + counts.period_s * np.array([-1.0, -0.5, 0.5, 1.0])
     tried = []
@@ -232,11 +233,30 @@ def _elsewhere(found: Likeliest, delay_s: float, delay_sd: float) -> Likeliest |
         point[:DELAY] -= along * off
         point[DELAY] = delay
         possible = 0.5 < point[MASS] / found.point[MASS] < 2
-        if abs(off) > near * counts.period_s and possible:
+        if abs(off) > _SAME * counts.period_s and possible:
             tried.append(np.maximum(point, _LOWEST))
-    if not tried:
-        return None
-    return _ascend(counts, max(tried, key=lambda one: _likely(counts, one)), _ABOUT, _FEW)
+    likely = np.array([-np.inf, *(_likely(counts, one) for one in tried), -np.inf])
+    tops = np.flatnonzero((likely[1:-1] >= likely[:-2]) & (likely[1:-1] >= likely[2:]))
+    best = sorted(tops.tolist(), key=lambda i: -likely[i + 1])[:_PLACES]
+    places = [found]
+    for i in best:
+        other = _ascend(counts, tried[i], _ABOUT, _FEW)
+        off = min(abs(other.point[DELAY] - place.point[DELAY]) for place in places)
+        if off > _SAME * counts.period_s:
+            places.append(other)
+    return places
+
+
+def among(found: Likeliest, places: list[Likeliest]) -> Likeliest:
+    """The same, the covariance wider by how far other places are, each by its probability.
+
+    That is of the normal there: its likelihood times the root of its covariance's determinant.
+    """
+    volume = [place.likely + 0.5 * np.linalg.slogdet(place.covariance)[1] for place in places]
+    share = np.exp(np.array(volume) - max(volume))
+    share /= share.sum()
+    apart = np.array([place.point - found.point for place in places])
+    return replace(found, covariance=found.covariance + (share[:, None] * apart).T @ apart)
 
 
 def _fallen(found: Likeliest) -> tuple[Floats, Floats]:
