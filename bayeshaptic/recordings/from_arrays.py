@@ -15,7 +15,9 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
 from bayeshaptic.recordings.signals.runs import (
     force_held,
+    force_held_unevenly,
     held_for,
+    held_unevenly,
     left_out,
     moving_part,
     position_held,
@@ -190,6 +192,8 @@ def _a_row_a_period(rows: _Rows, held: int, stamped: bool, told_s: float | None)
         return _Rows(signals[first::often], often * period_s, joints, notices)
     if held > 1 and not (stamped and told_s is not None):
         said: tuple[Notice, ...] = (force_held(signals.force, held, period_s, stamped),)
+    elif held == 1 and told_s is None and (rows_a_force := held_unevenly(signals.force)) > 1:
+        said = (force_held_unevenly(rows_a_force, period_s),)
     elif (late := held_for(signals.position)) > 1:
         said = (position_held(late, period_s),)
     else:

@@ -24,7 +24,7 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings import Recording, check_recording, read_recording
 from bayeshaptic.recordings.checks import what_drives_what
 from bayeshaptic.recordings.checks.sufficiency import FEWEST_SAMPLES
-from bayeshaptic.recordings.checks.units_in_doubt import in_doubt, steps_of_a_turn
+from bayeshaptic.recordings.checks.units_in_doubt import in_doubt, normalised, steps_of_a_turn
 from bayeshaptic.recordings.feedback import doubts, is_certain
 from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.units import is_assumed
@@ -166,6 +166,31 @@ def test_what_is_warned_of(text: str) -> None:
     (notice,) = check_recording(recording)
     assert (notice.level, notice.topic) == ("warning", topic)
     assert re.search(text, notice.text)
+
+
+@pytest.mark.parametrize("per_unit", [1.0, 1e-3])
+def test_positions_that_were_scaled_by_their_own_size_have_no_unit(per_unit: float) -> None:
+    position = held().position
+    made = {
+        "a standard deviation of 1": (position - position.mean()) / position.std(),
+        "reach 1, and no farther": position / np.abs(position).max(),
+        "from 0 to 1": (position - position.min()) / np.ptp(position),
+    }
+    made["deviation of 1"] = (position - position.mean()) / position.std(ddof=1)
+    for text, scaled in made.items():
+        found = check_recording(changed(position=per_unit * scaled, force=per_unit * held().force))
+        assert in_doubt("position", found) and any(text in notice.text for notice in found)
+
+
+def test_a_position_that_happens_to_reach_one_is_not_normalised() -> None:
+    reaching = held().position / np.abs(held().position).max()
+    for position in (
+        np.round(reaching, 3),  # as a file was written
+        np.clip(1.2 * reaching, -1.0, 1.0),  # as a sensor cuts off
+        1.0001 * reaching,
+        held().position,
+    ):
+        assert not normalised(changed(position=position))
 
 
 def test_a_device_file_betrays_units() -> None:

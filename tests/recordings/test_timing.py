@@ -10,7 +10,7 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.recordings import Recording, recording_from_arrays
 from bayeshaptic.recordings.checks.loop_period import doubts_of_the_loop, without_doubt
 from bayeshaptic.recordings.checks.two_clocks import two_clocks
-from bayeshaptic.recordings.signals.runs import held_for
+from bayeshaptic.recordings.signals.runs import held_for, held_unevenly
 from bayeshaptic.recordings.signals.timing import sampling_period
 from bayeshaptic.types import Floats, Ints
 
@@ -228,6 +228,32 @@ def test_a_clock_that_slips_holds_a_force_all_the_same() -> None:
     rng = np.random.default_rng(5)
     force = rng.standard_normal(1000)[(np.arange(8000) / 8.03).astype(int)]
     assert held_for(force) == 8
+
+
+@pytest.mark.parametrize("rows", [1.01, 1.25, 10 / 7, 2.5, 3.3])
+def test_a_force_whose_clock_beats_with_that_of_the_rows(rows: float) -> None:
+    rng = np.random.default_rng(8)
+    newest = (np.arange(20_000) / rows).astype(int)
+    force = rng.standard_normal(20_000)
+    smooth = np.cumsum(force)
+    for played in (force, smooth):
+        assert held_for(played[newest]) == 1
+        assert held_unevenly(played[newest]) == pytest.approx(rows, rel=1e-3)
+    moved = rng.standard_normal(20_000)
+    open_ = recording_from_arrays(force[newest], moved, time=1e-3 * np.arange(20_000))
+    assert doubts_of_the_loop(open_.notices) and "in the mean" in open_.notices[0].text
+    said = recording_from_arrays(force[newest], moved, 1e-3, time=1e-3 * np.arange(20_000))
+    assert not doubts_of_the_loop(said.notices)
+
+
+def test_forces_that_repeat_themselves_by_chance_have_no_clock_of_their_own() -> None:
+    rng = np.random.default_rng(9)
+    noise, turns = rng.standard_normal(20_000), np.arange(20_000)
+    ramps = np.abs((0.8 * turns) % 800 - 400)  # a converter's counts, equal steps
+    missed = noise[np.maximum.accumulate(np.where(rng.random(20_000) < 0.2, 0, turns))]
+    for force in (noise, np.round(noise, 1), np.round(3 * noise), ramps.round(), missed):
+        assert held_unevenly(force) == 1
+    assert held_unevenly(np.sign(np.sin(turns * np.pi / 2.3 + 0.1))) == 1
 
 
 def test_other_forces_that_stand_are_not_held() -> None:

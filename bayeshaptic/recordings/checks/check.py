@@ -10,7 +10,7 @@ from bayeshaptic.recordings.checks.against_device import against_response, compa
 from bayeshaptic.recordings.checks.loop_period import without_doubt
 from bayeshaptic.recordings.checks.sufficiency import FEWEST_SAMPLES, says_nothing_of_the_actuator
 from bayeshaptic.recordings.checks.two_clocks import two_clocks
-from bayeshaptic.recordings.checks.units_in_doubt import degrees, whole_numbers
+from bayeshaptic.recordings.checks.units_in_doubt import degrees, normalised, whole_numbers
 from bayeshaptic.recordings.checks.what_drives_what import what_drives_what
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.recordings.recording import Recording
@@ -58,6 +58,7 @@ def check_recording(recording: Recording, device: Device | None = None) -> tuple
         *_jitter(recording),
         *whole_numbers(recording),
         *degrees(recording),
+        *normalised(recording),
         *compare_resolution(recording, device),
     )
     rough = rough_response(recording)

@@ -24,6 +24,9 @@ _MASSES = {
     ("N", "m"): (3e-3, 0.5, 140.0, 50.0, "kg"),
     ("Nm", "rad"): (1e-7, 1e-3, 3.0, 0.3, "kg m^2"),
 }
+# A position that was brought to a scale of its own ends there to so much, unless it was written in
+# so many decimals; and an extreme that is cut off stands in more rows than that.
+_AT_SCALE, _DECIMALS, _LONE = 1e-6, 3, 3
 
 
 def in_doubt(quantity: str, notices: Iterable[Notice]) -> bool:
@@ -68,6 +71,49 @@ def whole_numbers(recording: Recording) -> list[Notice]:
         f"position=NAME*C with one count C in {unit}, or name their unit, as in position=NAME[mm]."
     )
     return [*notices, Notice("warning", "units", text, ("position",))]
+
+
+def normalised(recording: Recording) -> list[Notice]:
+    """Positions of standard deviation 1, from 0 to 1, or up to 1: scaled by their own size.
+
+    Written in `unit` or in a thousandth of it.  An extreme of exactly one is a chance of a file's
+    last digit.
+    """
+    position, unit = recording.position, recording.position_unit
+    for per_unit in (1.0, 1e3):
+        how = _scaled_by(per_unit * position)
+        if how is not None:
+            text = (
+                f"The positions {how}: were they normalised before they were written down? The "
+                f"limit would be in units of that, and not in {recording.force_unit}/{unit}: "
+                "record positions as they are read, or write position=NAME*C with what was divided "
+                "by."
+            )
+            return [Notice("warning", "units", text, ("position",))]
+    return []
+
+
+def _scaled_by(position: Floats) -> str | None:
+    """What was made one of these positions, in words; None where nothing shows it."""
+
+    def is_one(value: float) -> bool:
+        return bool(abs(value - 1) < _AT_SCALE)
+
+    def lone(value: float) -> bool:
+        return bool(np.sum(np.abs(np.abs(position) - value) < _AT_SCALE) <= _LONE)
+
+    size = len(position)
+    sd = position.std() * np.array([1.0, np.sqrt(size / (size - 1))])
+    if abs(position.mean()) < _AT_SCALE and np.abs(sd - 1).min() < _AT_SCALE:
+        return "have a mean of 0 and a standard deviation of 1"
+    if np.array_equal(position, np.round(position, _DECIMALS)):
+        return None
+    low, high = float(position.min()), float(position.max())
+    if low == 0 and is_one(high) and lone(1.0):
+        return "go from 0 to 1"
+    if is_one(max(-low, high)) and lone(1.0):
+        return "reach 1, and no farther"
+    return None
 
 
 def is_whole(signal: Floats) -> bool:

@@ -19,6 +19,10 @@ _FEWEST_CHANGES = 100
 _FEWEST_AT_REST, _LEAST_AT_REST = 100, 0.02  # rows of a standstill, and their share
 _AS_FAR = 0.5  # as a force pushes a mass where it moves; under less a device may just rest
 _MOST_TIMES = 20  # that a row is written
+# Of two clocks that beat: rows a change at most (beyond, `held_for` allows for slips), beats in a
+# block of changes, blocks at least, their share that is as long as the others to a row, and the
+# scatter of the steps over their mean (a ramp in counts of a converter has none).
+_MOST_UNEVEN, _BEATS, _FEWEST_BLOCKS, _MOSTLY, _STEPS_VARY = 4.0, 8, 10, 0.9, 0.1
 
 
 def runs(flags: Bools) -> tuple[Ints, Ints]:
@@ -101,6 +105,43 @@ def held_for(signal: Floats) -> int:
     return rows if np.mean(clocked) >= mostly and not square else 1
 
 
+def held_unevenly(signal: Floats) -> float:
+    """For how many rows a signal is held in the mean, by a clock that beats with that of the rows.
+
+    As where a log of 1 kHz writes the newest command of a servo of 800 Hz: every fourth is written
+    twice.  Any block of changes is then as long as any other to a row; what repeats by chance (a
+    coarse converter, a force of few levels) is uneven.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (N,)
+
+    Returns
+    -------
+    float
+        1 where no such clock shows.
+    """
+    steps = np.diff(signal)
+    at = np.flatnonzero(steps)
+    if len(at) < _FEWEST_CHANGES:
+        return 1.0
+    rows = float((at[-1] - at[0]) / (len(at) - 1))
+    beats = min(rows % 1, 1 - rows % 1)  # a change
+    whole = int(rows)
+    if not 1 < rows < _MOST_UNEVEN or beats == 0 or len(np.unique(signal)) == 2:
+        return 1.0
+    together = int(np.ceil(_BEATS / (beats * (1 - beats))))
+    lengths = at[together:] - at[:-together]
+    if len(at) < _FEWEST_BLOCKS * together:
+        return 1.0
+    apart = np.diff(at)
+    even = (np.abs(lengths - together * rows) <= 1).mean()
+    near = ((apart == whole) | (apart == whole + 1)).mean()
+    size = np.abs(steps[at])
+    vary = size.std() > _STEPS_VARY * size.mean()
+    return rows if even >= _MOSTLY and near >= _MOSTLY and vary else 1.0
+
+
 def moving_part(force: Floats, position: Floats, count: float) -> tuple[int, int]:
     """First row, and the one behind the last, without a standstill at either end.
 
@@ -171,6 +212,20 @@ def force_held(force: Floats, rows: int, period_s: float, stamped: bool) -> Noti
         f"its limit is lower than that of one of {quantity(period_s, 's')}. {cure}"
     )
     return Notice("warning", "period", text, (LOOP,) if levels and stamped else ())
+
+
+def force_held_unevenly(rows: float, period_s: float) -> Notice:
+    """A warning of a loop that runs at another rate than the rows, which no row is in time with."""
+    text = (
+        f"The force is held for {rows:.3g} rows in the mean, by a clock that beats with that of "
+        f"the rows: as where a log writes the newest command of a loop of "
+        f"{quantity(rows * period_s, 's')}, or a recording was brought to another rate afterwards. "
+        f"Commands then stand up to {quantity(period_s, 's')} after their time, which looks like "
+        "less delay than the loop has, and its limit is lower. Record the loop's own rows, or say "
+        f"--period-s {period_s:.6g} where the loop runs at every row and the excitation alone was "
+        "held."
+    )
+    return Notice("warning", "period", text, (LOOP,))
 
 
 def position_held(rows: int, period_s: float) -> Notice:
