@@ -20,6 +20,7 @@ from bayeshaptic.recordings.signals.runs import (
     held_unevenly,
     left_out,
     moving_part,
+    new_rows,
     position_held,
     rows_alike,
     written_each,
@@ -27,7 +28,7 @@ from bayeshaptic.recordings.signals.runs import (
 from bayeshaptic.recordings.signals.timing import Timing, sampling_period
 from bayeshaptic.recordings.signals.turns import unwrapped, without_jumps
 from bayeshaptic.recordings.units import assumed_units, base_unit, choose_units
-from bayeshaptic.types import Floats
+from bayeshaptic.types import Floats, Ints
 
 
 @at_the_door
@@ -123,7 +124,7 @@ class _Signals:
     position: Floats
     reference: Floats | None
 
-    def __getitem__(self, rows: slice) -> _Signals:
+    def __getitem__(self, rows: slice | Ints) -> _Signals:
         followed = None if self.reference is None else self.reference[rows]
         return _Signals(self.force[rows], self.position[rows], followed)
 
@@ -188,17 +189,26 @@ def _a_row_a_period(rows: _Rows, held: int, stamped: bool, told_s: float | None)
     often, first = written_each((signals.force, signals.position))
     if often > 1:
         joints = tuple(-((first - joint) // often) for joint in rows.joints)
-        notices = (*rows.notices, rows_alike(often, often * period_s))
-        return _Rows(signals[first::often], often * period_s, joints, notices)
+        return _once(rows, signals[first::often], float(often), joints)
     if held > 1 and not (stamped and told_s is not None):
         said: tuple[Notice, ...] = (force_held(signals.force, held, period_s, stamped),)
-    elif held == 1 and told_s is None and (rows_a_force := held_unevenly(signals.force)) > 1:
-        said = (force_held_unevenly(rows_a_force, period_s),)
+    elif held == 1 and told_s is None and (mean := held_unevenly(signals.force)) > 1:
+        new = new_rows(signals.force, signals.position, mean)
+        if new is not None:
+            joints = tuple(np.searchsorted(new, rows.joints).tolist())
+            return _once(rows, signals[new], mean, joints)
+        said = (force_held_unevenly(mean, period_s),)
     elif (late := held_for(signals.position)) > 1:
         said = (position_held(late, period_s),)
     else:
         said = ()
     return replace(rows, notices=rows.notices + said)
+
+
+def _once(rows: _Rows, signals: _Signals, often: float, joints: tuple[int, ...]) -> _Rows:
+    """`signals`, the new rows alone where every row stood so often in the mean."""
+    period_s = often * rows.period_s
+    return _Rows(signals, period_s, joints, (*rows.notices, rows_alike(often, period_s)))
 
 
 def _in_base_unit(

@@ -246,6 +246,33 @@ def test_a_force_whose_clock_beats_with_that_of_the_rows(rows: float) -> None:
     assert not doubts_of_the_loop(said.notices)
 
 
+@pytest.mark.parametrize("rows", [1.02, 1.25, 2.5])
+def test_rows_that_a_faster_log_wrote_again_are_read_once(rows: float) -> None:
+    rng = np.random.default_rng(10)
+    force, moved = rng.standard_normal((2, 20_000))
+    newest = (np.arange(20_000) / rows).astype(int)
+    stamps = 1e-3 * np.arange(20_000)
+    found = recording_from_arrays(force[newest], np.round(moved, 1)[newest], time=stamps)
+    assert found.period_s == pytest.approx(rows * 1e-3, rel=1e-3)
+    assert np.array_equal(found.force, force[1 : newest[-1] + 1])
+    assert np.array_equal(found.position, np.round(moved, 1)[1 : newest[-1] + 1])
+    assert not doubts_of_the_loop(found.notices)
+    assert any("in the mean" in notice.text for notice in found.notices)
+
+
+def test_rows_that_nobody_knows_to_be_written_again_are_kept() -> None:
+    """The position stands so often that it says nothing, or some of the loop's forces are alike."""
+    rng = np.random.default_rng(11)
+    force, moved = rng.standard_normal((2, 20_000))
+    newest = (np.arange(20_000) / 1.25).astype(int)
+    again = force.copy()
+    again[:4000:200] = again[1:4000:200]
+    standing = np.sign(moved - 9).astype(float)
+    for one, other in ((force, standing), (again, np.round(moved, 1))):
+        found = recording_from_arrays(one[newest], other[newest], time=1e-3 * np.arange(20_000))
+        assert found.samples == 20_000 and doubts_of_the_loop(found.notices)
+
+
 def test_forces_that_repeat_themselves_by_chance_have_no_clock_of_their_own() -> None:
     rng = np.random.default_rng(9)
     noise, turns = rng.standard_normal(20_000), np.arange(20_000)

@@ -23,6 +23,8 @@ _MOST_TIMES = 20  # that a row is written
 # block of changes, blocks at least, their share that is as long as the others to a row, and the
 # scatter of the steps over their mean (a ramp in counts of a converter has none).
 _MOST_UNEVEN, _BEATS, _FEWEST_BLOCKS, _MOSTLY, _STEPS_VARY = 4.0, 8, 10, 0.9, 0.1
+# That a position stands wherever the force does; and rows that two oscillators are apart at most.
+_BY_CHANCE, _OFF = 1e-9, 3.0
 
 
 def runs(flags: Bools) -> tuple[Ints, Ints]:
@@ -142,6 +144,29 @@ def held_unevenly(signal: Floats) -> float:
     return rows if even >= _MOSTLY and near >= _MOSTLY and vary else 1.0
 
 
+def new_rows(force: Floats, position: Floats, rows: float) -> Ints | None:
+    """Rows at which a force that is held unevenly changes; None where the position goes on between.
+
+    Then whole rows were written again, and these are the loop's own, unless the position stands so
+    often that it may do so in all of these by chance, or one of the loop's forces was the same as
+    the one before.
+
+    Parameters
+    ----------
+    force, position : ndarray, shape (N,)
+    rows : float
+        For how many the force is held in the mean.
+    """
+    again = np.diff(force) == 0
+    alike = np.diff(position) == 0
+    stands = float(np.mean(alike[~again]))
+    new = np.flatnonzero(~again) + 1
+    off = np.ptp(new - rows * np.arange(len(new)))
+    if off > _OFF or not np.all(alike[again]) or stands ** np.sum(again) > _BY_CHANCE:
+        return None
+    return new
+
+
 def moving_part(force: Floats, position: Floats, count: float) -> tuple[int, int]:
     """First row, and the one behind the last, without a standstill at either end.
 
@@ -184,12 +209,13 @@ def _pushes(force: Floats) -> Floats:
     return np.ptp(force, axis=-1)
 
 
-def rows_alike(often: int, period_s: float) -> Notice:
+def rows_alike(often: float, period_s: float) -> Notice:
     """A note that every row stands several times in a row, in a loop of this period."""
+    mean = "" if often % 1 == 0 else " in the mean"
     text = (
-        f"Every row stands {often} times in a row, as where a log is faster than the loop: one of "
-        f"each was read, and the loop's period is taken to be {quantity(period_s, 's')}. Say "
-        "otherwise with --period-s, which is that of a row."
+        f"Every row stands {often:.3g} times in a row{mean}, as where a log is faster than the "
+        "loop: one of each was read, and the loop's period is taken to be "
+        f"{quantity(period_s, 's')}. Say otherwise with --period-s, which is that of a row."
     )
     return Notice("note", "time stamps", text)
 
