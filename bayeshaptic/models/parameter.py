@@ -91,10 +91,12 @@ class Parameter:
         ------
         InputError
             For NaN and infinity, for what is outside its prior's support, and for what no prior
-            allows: masses that are not above zero, and dampers, springs and delays below it.
+            allows: masses that are not above zero, dampers and springs below it, and delays below
+            it, unless this one's prior says how far, as of a delay beyond the declared one.
         """
         low, high = (-math.inf, math.inf) if self.prior is None else self.prior.support
-        if self.dimension in _NEVER_BELOW_ZERO:
+        less = self.dimension == "time" and -math.inf < low
+        if self.dimension in _NEVER_BELOW_ZERO and not less:
             low = max(low, 0.0)
         above = value > 0 if self.dimension == "mass" else value >= low
         if not (math.isfinite(value) and above and low <= value <= high):

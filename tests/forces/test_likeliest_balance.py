@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_unrepeated import DRAG, dragged
@@ -15,6 +17,9 @@ from bayeshaptic.diagnosis.periodic.joint import Basis, Joint
 from bayeshaptic.diagnosis.periodic.lines import LineTrials
 from bayeshaptic.diagnosis.periodic.steady_motion import no_force
 from bayeshaptic.diagnosis.state import Accepted
+from bayeshaptic.diagnosis.trials.linear import accepted_with
+from bayeshaptic.effects.linear.attached_mass import SecondMode
+from bayeshaptic.numerics.spending import Meter
 
 
 @pytest.fixture(scope="module")
@@ -74,3 +79,18 @@ def test_the_limit_is_as_open_as_the_strength_of_a_force(kind: LineTrials) -> No
     (effect,) = state.accepted
     assert 0.003 < effect.limit_log_sd < 0.3
     assert effect.estimates["strength"].sd < 0.02 * DRAG
+
+
+def test_a_mode_whose_mass_a_force_acts_on_is_needed(kind: LineTrials) -> None:
+    """It had gone, and the force with no mass to act on was a KeyError."""
+    first = kind.first.part
+    mode = SecondMode.candidates(first.model, kind.etfe)[0]
+    model = first.model.with_effect(mode)
+    theta = np.append(first.theta, mode.starting_values(first.model, kind.etfe)[0])
+    part = kind._balance(model, (), theta, np.zeros(0))
+    here = [place.first for place in part.motions]
+    on_the_mode = replace(law(kind, 2), place=next(p for p in part.motions if p.first == max(here)))
+    part = kind._balance(model, (on_the_mode,), part.theta, np.zeros(1))
+    force = Accepted("drag", on_the_mode.title, "nonlinear", "")
+    state = kind._state(part, (accepted_with(mode), force))
+    assert kind.without_needless(state, Meter()) is state

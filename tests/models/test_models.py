@@ -16,6 +16,7 @@ from bayeshaptic.models import (
     LogNormal,
     NearZero,
     Normal,
+    Parameter,
     Uniform,
     build_model,
     free,
@@ -308,3 +309,8 @@ def test_a_known_value_is_one_that_the_parameter_can_have():
     with pytest.raises(InputError, match="delay_s is -0.0001; a loop delay can be from 0 on"):
         bh.rigid().with_known({"delay_s": -1e-4})
     assert model.with_known({"m1": 0.2, "b1": 0, "other": -1}).fixed["b1"] == 0.0
+    # A delay beyond the declared one is below zero where the loop has less than was declared.
+    later = Parameter("extra_delay_s", "time", "delay", Normal(0.0, 1e-3, low=-2e-4))
+    assert later.known(-1e-4) == -1e-4
+    with pytest.raises(InputError, match="from -0.0002 on"):
+        later.known(-3e-4)

@@ -23,6 +23,7 @@ from bayeshaptic.diagnosis.periodic.forces import force_candidates
 from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced, balance, promise
 from bayeshaptic.diagnosis.periodic.joint import Basis
 from bayeshaptic.diagnosis.periodic.period import one_period, with_floor
+from bayeshaptic.diagnosis.periodic.steady_motion import places_of
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import (
     FIT,
@@ -140,6 +141,8 @@ class LineTrials:
                 tried = self._without(state.part, effect)
             except np.linalg.LinAlgError:  # without it the motion runs away: it is needed
                 continue
+            if tried is None:
+                continue
             loss = full - self._log_likelihoods(tried)[1]
             if needless(loss, len(effect.parameters) or 1) and loss < least:
                 left = state.accepted[:index] + state.accepted[index + 1 :]
@@ -207,12 +210,15 @@ class LineTrials:
     ) -> Balanced:
         return likeliest(model, self.windows, self.period, forces, theta, strength, self.fitted)
 
-    def _without(self, part: Balanced, effect: Accepted) -> Balanced:
-        """Everything else fitted anew to the lines to fit."""
+    def _without(self, part: Balanced, effect: Accepted) -> Balanced | None:
+        """Everything else fitted anew to the lines to fit; None where a force acts on its mass."""
         if effect.change is not None and effect.change.effect is not None:
             kept = [name not in effect.parameters for name in part.model.names]
-            model = part.model.without_effect(effect.change.effect)
-            return self._balance(model, part.forces, part.theta[kept], part.strength)
+            model, theta = part.model.without_effect(effect.change.effect), part.theta[kept]
+            places = places_of(model.system(theta))
+            if any(basis.place not in places for basis in part.forces):
+                return None
+            return self._balance(model, part.forces, theta, part.strength)
         own = [basis.title != effect.title for basis in part.forces]
         forces = tuple(basis for basis, stays in zip(part.forces, own, strict=True) if stays)
         return self._balance(part.model, forces, part.theta, part.strength[own])
