@@ -182,7 +182,7 @@ def _of_the_alignment(analysis: Analysis) -> list[str]:
         )
     if any(notice.topic == LESS_DELAY for notice in analysis.notices):
         found.append(
-            "a simpler model explains the recording with less delay than was told, as where a "
+            "a model explains the recording with less delay than was told, as where a "
             "position is written down before its command acts, and with that delay the limit is "
             "lower: correct the columns, or --delay-s"
         )
@@ -235,7 +235,7 @@ def _of_the_limit(analysis: Analysis) -> list[str]:
 
 
 def _less_delay_s(analysis: Analysis) -> float | None:
-    """How much less delay than was told is found; None for less than half a sampling period."""
+    """How much less delay than was told is found; None for less than a quarter of a period."""
     model, least_s = analysis.model, LESS * analysis.etfe.period_s
     if not analysis.sampled or LATER not in model.names:
         return None

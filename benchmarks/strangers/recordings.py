@@ -44,7 +44,7 @@ def make(seed: int) -> Case | None:
     delay_s = delay_of(draw, sizes, period_s)
     device = states_of(draw, sizes)
     seconds, excitation = draw.between(6, 40), str(rng.choice(EXCITATIONS))
-    force = _force(draw, excitation, seconds, period_s)
+    force = force_of(draw, excitation, seconds, period_s)
     made = simulated(draw, sizes, device, force, period_s, delay_s)
     if made is None:
         return None
@@ -65,7 +65,7 @@ def make(seed: int) -> Case | None:
     return Case(recording, told, what, effects, truth, *base_of(draw.values))
 
 
-def _force(draw: Draw, excitation: str, seconds: float, period_s: float) -> Array:
+def force_of(draw: Draw, excitation: str, seconds: float, period_s: float) -> Array:
     """The command, of 0.3 to 3 times the usual size."""
     rng, count = draw.rng, int(seconds / period_s)
     low, high = BAND_HZ[draw.like]

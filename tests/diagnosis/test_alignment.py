@@ -168,6 +168,37 @@ def test_less_delay_than_was_told_gets_no_stiffness(told_s: float) -> None:
     assert early == (told_s == bench.delay_s) and (told.stiffness is None) == early
 
 
+def test_half_a_period_less_than_was_told_is_another_instant() -> None:
+    """Half a period early, as between two commands or integrated again: too high a limit."""
+    bench = replace(Bench.from_device("phantom", False), delay_s=0.8e-3)
+    bench = bench.with_effect("second_mode", frequency_hz=60.0)
+    closed = close_loop(recorded(bench, 0), "free", hidden=False, delay_s=1.25e-3)
+    assert {effect.name for effect in closed.effects} == {"second_mode", "extra_delay"}
+    said = headline(closed)
+    assert said.stiffness is None and "less delay than was told" in said.sentence
+
+
+@pytest.mark.parametrize(
+    ("told_s", "model"), [(1e-3, "rigid"), (1.5e-3, "rigid"), (1.5e-3, "free")]
+)
+def test_less_delay_shows_where_nothing_is_left_but_noise(told_s: float, model: str) -> None:
+    # The chosen model itself leaves less with any delay, or a simpler one explains as much.
+    bench = replace(Bench.from_device("phantom", False, "rigid"), delay_s=1e-3)
+    made = simulate(bench, NOISE, seed=3)
+    noise = 6 * bench.encoder_resolution * np.random.default_rng(0).standard_normal(10_000)
+    recording = recording_from_arrays(
+        made.force, made.position + noise, 1e-3, force_unit="Nm", position_unit="rad"
+    )
+    found = opened(recording, model, Options(delay_s=told_s))
+    tried = {
+        name: least_squares(build_model(name, None, told_s), found.etfe)
+        for name in ("rigid", model)
+    }
+    assert not any(fit.misfits for fit in tried.values())
+    fit = tried.pop(model)
+    assert bool(perhaps_early(found, fit, tried.values())) == (told_s > bench.delay_s)
+
+
 def test_every_piece_is_moved_by_itself() -> None:
     one, other = (
         recording_from_arrays(force, 2 * force, 1e-3, force_unit="N", position_unit="m")

@@ -10,6 +10,7 @@ import numpy as np
 from bayeshaptic.diagnosis.base.opened import Opened, opened
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError, Notice
+from bayeshaptic.inference.criterion import information_criterion
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.likelihood import Likelihood
@@ -24,14 +25,12 @@ from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.types import Floats
 
 MOVED, LESS_DELAY = "rows moved", "less delay"  # topics of notices
-# Of a sampling period: so much less delay than was told is no wrong number, but another sample.  An
-# extra delay is named in eight of 510 strangers' recordings; none is refused for this.
-LESS = 0.5
-# Likewise where a simpler model says so: the mean of two commands leads by half a period.  That of
-# three filters, too, and leaves so little of what a simpler model misfits by.  Of 14 such means
-# whose delay was told rightly all are refused, of 163 other recordings none; of 51 of these no
-# shorter delay takes off more than a quarter (docs/door.md).
-_LEAD, _REST = 0.25, 0.1
+# Of a sampling period: so much less delay than was told is no wrong number, but another instant: a
+# position that is read between two commands, a derivative that was integrated again and the mean of
+# two commands lead by half a period.  That of three filters, too, and leaves so little of what a
+# simpler model misfits by.  How often either is seen, and where it is not there: docs/door.md.
+LESS, _REST = 0.25, 0.1
+_SURELY = 10.0  # of twice the log likelihood; "very strong" evidence (Kass and Raftery, 1995)
 # The reduced chi-square must fall to this share; rows of one sample hardly change it. How many of
 # those are moved nevertheless: docs/door.md.
 _FALLS = 0.9
@@ -164,10 +163,11 @@ def perhaps_late(fit: Fit) -> tuple[Notice, ...]:
 
 
 def perhaps_early(found: Opened, fit: Fit, simpler: Iterable[Fit]) -> tuple[Notice, ...]:
-    """A warning where a simpler model needs nothing but far less delay than was told.
+    """A warning where a model needs nothing but far less delay than was told.
 
-    A mode too many, damped so much that it only leads, makes up for the delay that is missing:
-    as a mass more, or as an effect that was found.
+    The chosen one, in which some other parameter may make up for the delay that is missing, and not
+    quite; or a simpler one that misfits: a mode too many, damped so much that it only leads, makes
+    up for it, as a mass more, or as an effect that was found.
 
     Parameters
     ----------
@@ -183,14 +183,11 @@ def perhaps_early(found: Opened, fit: Fit, simpler: Iterable[Fit]) -> tuple[Noti
         return ()
     found_too = ", ".join(effect.name.replace("_", " ") for effect in told.effects)
     chosen = f"{told.name} with {found_too}" if found_too else told.name
-    for other in simpler:
-        if not other.misfits:
-            continue
+    for other in (fit, *simpler):
         best = _from(other, _with_any_delay(other.model), found.etfe)
         less_s = told_s - _delay_s(best)
         sd_s = best.sd[best.model.names.index("delay_s")]
-        rest = (best.reduced_chi_square - 1) / (other.reduced_chi_square - 1)
-        if (rest < _REST or not best.misfits) and less_s - 2 * sd_s > _LEAD * recording.period_s:
+        if _needs_less(best, other, fit) and less_s - 2 * sd_s > LESS * recording.period_s:
             text = (
                 f"{best.model.name} leaves a reduced chi-square of {pure(best.reduced_chi_square)} "
                 f"with {quantity(less_s, 's')} less delay than was told, and {chosen} "
@@ -256,6 +253,24 @@ def _promising(model: Model, etfe: Etfe) -> Floats:
     with np.errstate(all="ignore"):
         left = Likelihood(model, compress(etfe)).reduced_chi_square(points)
     return points[np.argsort(left)[:_OWN]]
+
+
+def _needs_less(best: Fit, other: Fit, fit: Fit) -> bool:
+    """Whether a model with any delay explains far more than with the one that was told.
+
+    Where that left nothing but noise: surely more, and no less than the chosen fit.
+    """
+    if other.misfits:
+        rest = (best.reduced_chi_square - 1) / (other.reduced_chi_square - 1)
+        return rest < _REST or not best.misfits
+    better = information_criterion(best, noise=1.0) < information_criterion(fit, noise=1.0)
+    return _gain(best, other) > _SURELY and better
+
+
+def _gain(after: Fit, before: Fit) -> float:
+    """In squared residuals; both fits are to the same windows."""
+    count = 2 * before.windows.target.size
+    return count * (before.reduced_chi_square - after.reduced_chi_square)
 
 
 def _falls(after: Fit, before: Fit) -> bool:
