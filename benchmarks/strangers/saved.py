@@ -62,8 +62,8 @@ def make(seed: int) -> Case | None:
     else:
         rows = 1.0
         force, position, how = _treated(draw, treatment, force, position, period_s)
-    # A loop that runs at the rows' rate is no other than the recorded one to whoever reads them.
-    periods = {period_s, rows * period_s}
+    # Rows made anew are those of a loop of their own rate to whoever reads them.
+    periods = {period_s} if treatment == "newest row" else {period_s, rows * period_s}
     truth = max(device.critical_stiffness(each, delay_s) for each in periods)
     recording = recording_from_arrays(
         force,
