@@ -174,7 +174,7 @@ def test_positions_that_were_scaled_by_their_own_size_have_no_unit(per_unit: flo
     made = {
         "a standard deviation of 1": (position - position.mean()) / position.std(),
         "reach 1, and no farther": position / np.abs(position).max(),
-        "from 0 to 1": (position - position.min()) / np.ptp(position),
+        "from 0 to 1": np.clip(1.2 * (position - position.min()) / np.ptp(position), 0, 1),
     }
     made["deviation of 1"] = (position - position.mean()) / position.std(ddof=1)
     for text, scaled in made.items():

@@ -109,7 +109,7 @@ def _scaled_by(position: Floats) -> str | None:
     if np.array_equal(position, np.round(position, _DECIMALS)):
         return None
     low, high = float(position.min()), float(position.max())
-    if low == 0 and is_one(high) and lone(1.0):
+    if low == 0 and is_one(high):  # cut off at both ends, too
         return "go from 0 to 1"
     if is_one(max(-low, high)) and lone(1.0):
         return "reach 1, and no farther"
