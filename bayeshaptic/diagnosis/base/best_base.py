@@ -15,7 +15,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.base.alignment import realigned
 from bayeshaptic.diagnosis.base.begun import Begun, base_of, fitted, refitted
-from bayeshaptic.diagnosis.base.loops_in_turn import LoopsInTurn
+from bayeshaptic.diagnosis.base.loops_in_turn import LoopsInTurn, parameters_of
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.inference.choose import Choice, ScoredFit
@@ -205,11 +205,15 @@ def _comparable(
 
 
 def _best(found: Mapping[str, Traced], noise: float, given_up: Collection[str] = ()) -> str:
-    """The best loop: one that explains, then by BIC; of equals that with the fewest effects."""
+    """The best loop: one that explains, then by BIC; of equals that with the fewest parameters.
+
+    Each effect counts as one more, for its choice: a third mass with a spring is a hand.  And a
+    mass more, above the band, takes up a drag: 1.07 times the limit.
+    """
     among = _comparable(found, noise, given_up)
     behind = {name: criterion(traced, noise) for name, traced in among.items()}
     equals = [name for name in behind if behind[name] <= min(behind.values()) + _BARE_MENTION]
-    return min(equals, key=lambda name: (len(found[name].state.accepted), behind[name]))
+    return min(equals, key=lambda name: (parameters_of(found[name].state), behind[name]))
 
 
 def criterion(traced: Traced, noise: float) -> float:
@@ -233,5 +237,5 @@ def _said(best: str, found: Mapping[str, Traced], noise: float, given_up: Collec
             verdict = "given up: more would be no simpler than what explains"
         words.append(f"{name} with {effects} ({verdict})")
     least = min(_comparable(found, noise, given_up), key=lambda name: behind[name])
-    most = "as much with fewer effects" if behind[least] < 0 else "the most"
+    most = "as much with fewer parameters" if behind[least] < 0 else "the most"
     return f" With what each of them lacks, {best} explains {most}: {'; '.join(words)}."
