@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
 import bayeshaptic as bh
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.choose import choose_model
+from bayeshaptic.inference.saved.arviz_groups import import_arviz
 from bayeshaptic.models import HalfNormal, LogNormal, LogUniform, NearZero, Normal, Uniform, draw
 from bayeshaptic.numerics.mixture import student
 from bayeshaptic.numerics.mixture_fit import fit_student_mixture
@@ -129,8 +134,7 @@ def test_a_saved_posterior_is_as_good(held_phantom, tmp_path):
     weighed, predicted = (data[name].sizes for name in ("log_likelihood", "posterior_predictive"))
     assert weighed["chain"] == predicted["chain"] and weighed["draw"] == predicted["draw"]
     assert weighed["window"] == predicted["frequency"]
-    import arviz as az
-
+    az = import_arviz()
     assert float(az.ess(data["posterior"]["kc"].values)) > 1000
     file = az.from_netcdf(path)
     for name in groups - {"/"}:
@@ -194,3 +198,17 @@ def test_a_mixture_is_the_density_of_its_draws():
     assert weights.mean() == pytest.approx(1.0, abs=5 * weights.std() / np.sqrt(len(weights)))
     fitted = fit_student_mixture(x, np.ones(len(x)), 2, 8.0, rng)
     assert np.sort(fitted.weights) == pytest.approx([0.3, 0.7], abs=0.03)
+
+
+def test_arviz_is_imported_where_nobody_may_write_that_it_was_advertised(tmp_path) -> None:
+    """As where two processes write it at once: a file stands where the folder is to be."""
+    (tmp_path / "arviz").write_text("")
+    code = (
+        "from bayeshaptic.inference.saved.arviz_groups import import_arviz; import os; "
+        "print(import_arviz().__name__, os.environ['XDG_CACHE_HOME'])"
+    )
+    there = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=there, capture_output=True, text=True, check=False
+    )
+    assert done.stdout.split() == ["arviz", str(tmp_path)], done.stderr

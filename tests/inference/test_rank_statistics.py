@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import arviz as az
 import numpy as np
 import pytest
 
+from bayeshaptic.inference.saved.arviz_groups import import_arviz
 from bayeshaptic.numerics.rank_statistics import of_ensembles, split_rhat
 from bayeshaptic.types import Floats
+
+az = import_arviz()
 
 
 def _walk(chains: int, draws: int, memory: float, apart: float = 0.0) -> Floats:

@@ -12,6 +12,7 @@ from fake_analysis import fake_analysis, fake_closed
 from fake_study import fake_study
 
 import bayeshaptic as bh
+from bayeshaptic.inference.saved.arviz_groups import import_arviz
 from bayeshaptic.report.walls.section import case_of, table_of
 
 ROOT = Path(__file__).parents[2]
@@ -128,8 +129,7 @@ def test_a_model_without_finitely_many_states_says_so() -> None:
 
 def test_arviz_sees_what_the_report_says(tmp_path: Path) -> None:
     """R-hat, effective draws and the predictive check, of the object and of the file."""
-    import arviz
-
+    arviz = import_arviz()
     posterior = ANALYSIS.posterior
     data = posterior.to_arviz()
     assert data.posterior["m1"].attrs["units"] == "kg"

@@ -6,10 +6,13 @@ takes a dictionary of groups.  Given the other's form, 0.x fails silently.
 
 from __future__ import annotations
 
+import importlib
 import json
+import os
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Protocol
 
 import numpy as np
@@ -24,6 +27,7 @@ from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Floats
 
+_CACHE = "XDG_CACHE_HOME"  # below it programs write what they may lose, on Linux
 MARK = "bayeshaptic"
 TOTAL = "total_log_likelihood"
 """In `sample_stats`: of the whole measurement, where ArviZ expects one for each observation."""
@@ -76,7 +80,7 @@ def to_arviz(posterior: Sampled) -> Any:
     -------
     arviz.InferenceData (0.x) or xarray.DataTree (1.x)
     """
-    az = _arviz()
+    az = import_arviz()
     groups = {name: dataset(group) for name, group in _groups(posterior).items()}
     if int(az.__version__.split(".")[0]) < 1:  # 1.x has the old name too, but not the old thing
         return az.InferenceData(**groups)
@@ -85,13 +89,26 @@ def to_arviz(posterior: Sampled) -> Any:
     return xarray.DataTree.from_dict(groups)
 
 
-def _arviz() -> Any:
-    """The arviz module, without its once-a-day advertisement of the next version."""
+def import_arviz() -> Any:
+    """The arviz module, without its once-a-day advertisement of the next version.
+
+    It writes down when it was advertised, and fails to be imported where another process does so at
+    the same moment, or where nobody may write: then once more, with a place of its own for that.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FutureWarning)
-        import arviz
-
-    return arviz
+        try:
+            return importlib.import_module("arviz")
+        except OSError:
+            before = os.environ.get(_CACHE)
+        with TemporaryDirectory() as own:
+            os.environ[_CACHE] = own
+            try:
+                return importlib.import_module("arviz")
+            finally:
+                del os.environ[_CACHE]
+                if before is not None:
+                    os.environ[_CACHE] = before
 
 
 def save_posterior(posterior: Sampled, path: Path) -> Path:
