@@ -1,12 +1,12 @@
 """Recordings made in closed loop: how often the intervals hold what the bench was.
 
-    python -m benchmarks.closed_loop [COUNT]
+    python -m benchmarks.closed_loop [COUNT] [--white SHARE] [--first SEED]
 
 Rigid devices of 0.1 to 10 kg under five controllers and four kinds of references, 2 to 30 s.  In
 seven of ten there is a force that depends on the position, and friction that changes along the way,
 differs between the directions, and fades near standstill: none of these is a law of the model.
 The same once more without such a force, and with one of white noise in its place: widths beside the
-least that are possible.
+least that are possible.  With --white that alone, of this share of the command.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from benchmarks.one_mass_bound import bound, spreads, with_limit
 from benchmarks.recordings.one_mass import PERIOD_S, make
 
 DRAWS = 600
+FIRST = 1000  # seed of the loops under a white force
 
 
 def limit_draws(truth: Floats, values: Floats, covariance: Floats, seed: int) -> Floats:
@@ -85,11 +86,11 @@ def main(count: int) -> None:
         )
 
 
-def beside_the_bound(count: int, noise: float, along_too: bool = False) -> None:
+def beside_the_bound(count: int, noise: float, along_too: bool = False, first: int = FIRST) -> None:
     """Print how wide posteriors are, and errors, beside the Cramer-Rao bound."""
     widths, errors, inside, white = [], [], [], []
     reach = student.ppf(0.95, FREEDOM)
-    for seed in range(1000, 1000 + count):
+    for seed in range(first, first + count):
         case = make(seed, noise, along_too)
         try:
             found = in_white_force(fit_motion(case.recording), case.recording)
@@ -117,8 +118,13 @@ def beside_the_bound(count: int, noise: float, along_too: bool = False) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", nargs="?", type=int, default=200)
-    asked = parser.parse_args().count
-    main(asked)
-    for share in (0.003, 0.01, 0.03):
-        beside_the_bound(asked // 4, share)
-    beside_the_bound(asked // 2, 0.01, along_too=True)
+    parser.add_argument("--white", type=float, metavar="SHARE", help="of the command's size")
+    parser.add_argument("--first", type=int, default=FIRST, metavar="SEED")
+    asked = parser.parse_args()
+    if asked.white is not None:
+        beside_the_bound(asked.count, asked.white, first=asked.first)
+    else:
+        main(asked.count)
+        for share in (0.003, 0.01, 0.03):
+            beside_the_bound(asked.count // 4, share)
+        beside_the_bound(asked.count // 2, 0.01, along_too=True)

@@ -7,9 +7,10 @@ import pytest
 from scipy.stats import chi2, norm, truncnorm
 
 from bayeshaptic.inference.time_domain.counts import cut_normals
+from bayeshaptic.inference.time_domain.counts.ascent import Likeliest
 from bayeshaptic.inference.time_domain.counts.filter import Counts
 from bayeshaptic.inference.time_domain.counts.fit import by_counts
-from bayeshaptic.inference.time_domain.counts.likeliest import Likeliest, about, among, exactly
+from bayeshaptic.inference.time_domain.counts.likeliest import about, among, exactly
 from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.recordings import join_recordings, recording_from_arrays
 from bayeshaptic.recordings.recording import Recording

@@ -10,7 +10,7 @@ import numpy as np
 from bayeshaptic.diagnosis.base.opened import Opened, opened
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError, Notice
-from bayeshaptic.inference.criterion import information_criterion
+from bayeshaptic.inference.criterion import deviance, information_criterion
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.likelihood import Likelihood
@@ -263,14 +263,9 @@ def _needs_less(best: Fit, other: Fit, fit: Fit) -> bool:
     if other.misfits:
         rest = (best.reduced_chi_square - 1) / (other.reduced_chi_square - 1)
         return rest < _REST or not best.misfits
+    gain = deviance(other, noise=1.0)[0] - deviance(best, noise=1.0)[0]
     better = information_criterion(best, noise=1.0) < information_criterion(fit, noise=1.0)
-    return _gain(best, other) > _SURELY and better
-
-
-def _gain(after: Fit, before: Fit) -> float:
-    """In squared residuals; both fits are to the same windows."""
-    count = 2 * before.windows.target.size
-    return count * (before.reduced_chi_square - after.reduced_chi_square)
+    return gain > _SURELY and better
 
 
 def _falls(after: Fit, before: Fit) -> bool:

@@ -25,7 +25,8 @@ _MASSES = {
     ("Nm", "rad"): (1e-7, 1e-3, 3.0, 0.3, "kg m^2"),
 }
 # A position that was brought to a scale of its own ends there to so much, unless it was written in
-# so many decimals; and an extreme that is cut off stands in more rows than that.
+# so many decimals; and an extreme that is cut off stands in more rows than that.  Seen in four of
+# four such recordings, and in none of 484 others.
 _AT_SCALE, _DECIMALS, _LONE = 1e-6, 3, 3
 
 

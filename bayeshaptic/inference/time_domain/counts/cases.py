@@ -15,8 +15,8 @@ from bayeshaptic.types import Floats
 
 SLIGHT = 1e-10  # of the whole: a case less likely is none
 # Blocks of a mass that moves one way: since this sample, since the one before, since longer.  With
-# four or ten likelihoods near rest are the same to a tenth; with one K_CR's delay is several
-# standard deviations off where a mass crawls.
+# four or ten the log likelihoods of two loops that crawl are the same to a tenth; with one delays
+# were up to 5.5 standard deviations off (docs/closed-loop.md).
 AGES = 3
 BLOCKS = 2 * AGES + 1
 
@@ -69,22 +69,11 @@ def outcome(
     `pushed` has velocity, its standard deviation and covariances (x, v, f), what the command and
     friction add.  `new` is room.
     """
-    likely, at, left = part
+    _, at, left = part
     side, age = since
     velocity, sd, push, rub = pushed[0], pushed[1], pushed[5], pushed[6]
     with_x, with_v, with_f = pushed[2], pushed[3], pushed[4]
-    new[:] = case
-    lost, off = (1 - left) / sd**2, at / sd
-    new[0] *= likely
-    new[1] += with_x * off
-    new[2] += with_v * off
-    new[3] += with_f * off
-    new[4] -= with_x * with_x * lost
-    new[5] -= with_x * with_v * lost
-    new[6] -= with_v * with_v * lost
-    new[7] -= with_x * with_f * lost
-    new[8] -= with_v * with_f * lost
-    new[9] -= with_f * with_f * lost
+    _given(new, case, pushed, part)
     if way == 0 and not side * push < -rub:
         if side != 0:
             _stop(new, side, rub - side * push, held[3], span_s)
@@ -117,6 +106,25 @@ def outcome(
     new[8] = keeps * with_f
     block = AGES - way * (1 + (age if way == side else 0))
     add(into[block * (len(into) // BLOCKS) + cell], new)
+
+
+@kernel(inline=True)
+def _given(new: Floats, case: Floats, pushed: Floats, part: tuple[float, float, float]) -> None:
+    """Write into `new` the normal of a case whose pushed velocity is in a part of its range."""
+    likely, at, left = part
+    sd, with_x, with_v, with_f = pushed[1], pushed[2], pushed[3], pushed[4]
+    new[:] = case
+    lost, off = (1 - left) / sd**2, at / sd
+    new[0] *= likely
+    new[1] += with_x * off
+    new[2] += with_v * off
+    new[3] += with_f * off
+    new[4] -= with_x * with_x * lost
+    new[5] -= with_x * with_v * lost
+    new[6] -= with_v * with_v * lost
+    new[7] -= with_x * with_f * lost
+    new[8] -= with_v * with_f * lost
+    new[9] -= with_f * with_f * lost
 
 
 @kernel(inline=True)

@@ -10,15 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from bayeshaptic.inference.time_domain.counts.ascent import Likeliest, after, slopes_of
 from bayeshaptic.inference.time_domain.counts.filter import Counts
-from bayeshaptic.inference.time_domain.counts.likeliest import (
-    ROUGH,
-    Likeliest,
-    about,
-    after,
-    exactly,
-    slopes_of,
-)
+from bayeshaptic.inference.time_domain.counts.likeliest import ROUGH, about, exactly
 from bayeshaptic.inference.time_domain.fit import MotionFit
 from bayeshaptic.inference.time_domain.innovations.filter import Disturbance
 from bayeshaptic.inference.time_domain.mass_forces import COULOMB

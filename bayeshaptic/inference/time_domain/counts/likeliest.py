@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
-from bayeshaptic.inference.time_domain.counts.filter import Counts, Followed
-from bayeshaptic.inference.time_domain.mass_in_loop import DAMPING, DELAY, MASS, SHARED
-from bayeshaptic.numerics.gauss_newton import lengths
+from bayeshaptic.inference.time_domain.counts.ascent import (
+    LOWEST,
+    TRIALS,
+    Likeliest,
+    after,
+    ascend,
+    likely_at,
+)
+from bayeshaptic.inference.time_domain.counts.filter import Counts
+from bayeshaptic.inference.time_domain.mass_in_loop import DELAY, MASS
 from bayeshaptic.types import Floats
 
-WHITE = SHARED  # in a point: behind the values, the logarithm of the white force's sd
 ROUGH = 4  # cells of a count, with which values are looked for at first
 _FINER = (8, 16, 32)  # cells, where fewer are not enough
 # Squared changes of the samples' log likelihoods with twice the cells, added: with less than this
@@ -21,14 +27,8 @@ _ENOUGH = 4.0
 # Normals that are added in one of some 150 passes: half a minute in all.  What takes more is left
 # to a filter; with a larger number a long recording would take minutes.
 _WORK = 5e6
-_LOWEST = np.array([1e-12, 0.0, 0.0, -np.inf, 0.0, -np.inf])
 _SIZES = 10.0 ** np.arange(-4.0, 0.6, 0.25)  # of the command, that a white force may have
-_STEPS, _TRIALS = 30, 8  # of an ascent, and of a step, at most: what takes more has not settled
 _FEW = 8  # steps, after which it shows whether more are worth while
-# Of the standard deviation, that slopes are taken over.  Over more than one, what single counts say
-# of a value that they know well counts several times.
-_OVER = 0.15
-_RIDGE = 1e-10  # of the information: what two values share that nothing tells apart
 _ABOUT = 0.1  # log likelihood that a step gains at the end, where it is only looked for
 _SETTLED = 0.03  # the same, where it is found
 _AWAY = 2.0  # standard deviations off, where the likelihood is looked at
@@ -37,43 +37,10 @@ _SAME = 0.1  # of a period, within which nothing else is looked for
 _AGAIN = 3  # ascents from what was found there: after them nothing has settled
 
 
-@dataclass(frozen=True, eq=False)
-class Likeliest:
-    """Where the likelihood of the counts is largest.
-
-    Attributes
-    ----------
-    counts : Counts
-        With as many cells as it takes.
-    point : ndarray, shape (6,)
-        Values, and the logarithm of the white force's standard deviation.
-    likely : float
-        Logarithm of the likelihood.
-    slopes : ndarray, shape (N, 6)
-        Of the logarithms of probabilities.
-    covariance : ndarray, shape (6, 6)
-    settled : bool
-    past : ndarray, shape (6,)
-        Standard deviations by which slopes point past the bounds of values that are there.
-    """
-
-    counts: Counts = field(repr=False)
-    point: Floats
-    likely: float
-    slopes: Floats = field(repr=False)
-    covariance: Floats
-    settled: bool
-    past: Floats = field(default_factory=lambda: np.zeros(WHITE + 1))
-
-    @property
-    def force_sd(self) -> float:
-        return float(np.exp(self.point[WHITE]))
-
-
 def about(counts: Counts, values: Floats) -> Likeliest:
     """Some steps from `values`, shape (5,), to the likeliest, with few cells."""
     counts = replace(counts, cells=ROUGH)
-    return _ascend(counts, _begun(counts, values), _ABOUT, _FEW)
+    return ascend(counts, _begun(counts, values), _ABOUT, _FEW)
 
 
 def exactly(near: Likeliest, delay_s: float, delay_sd: float) -> Likeliest | None:
@@ -90,40 +57,19 @@ def exactly(near: Likeliest, delay_s: float, delay_sd: float) -> Likeliest | Non
     if cells is None:
         return None
     counts = replace(first.counts, cells=cells)
-    found = _ascend(counts, first.point, _SETTLED)
+    found = ascend(counts, first.point, _SETTLED)
     for _ in range(_AGAIN):
         covariance, highest = _fallen(found)
-        if _likely(counts, highest) < found.likely + _SETTLED:
+        if likely_at(counts, highest) < found.likely + _SETTLED:
             return among(_held(replace(found, covariance=covariance)), places)
-        found = _ascend(counts, highest, _SETTLED)
+        found = ascend(counts, highest, _SETTLED)
     return replace(found, settled=False)
 
 
 def _begun(counts: Counts, values: Floats) -> Floats:
     """Values with the likeliest of some sizes of the white force, shape (6,)."""
     tried = np.log(_SIZES * np.std(counts.command))
-    return max((np.append(values, size) for size in tried), key=lambda at: _likely(counts, at))
-
-
-def after(counts: Counts, point: Floats, more: Floats | None = None) -> Followed:
-    """The counts with these values and this white force, and a further force."""
-    return counts.after(point[:SHARED], float(np.exp(point[WHITE])), more)
-
-
-def slopes_of(counts: Counts, point: Floats, sd: Floats) -> Floats:
-    """Of the logarithms of probabilities, over a part of standard deviations; shape (N, 6)."""
-    out = np.zeros((len(counts.position), len(point)))
-    for i, step in enumerate(_OVER * sd):
-        up, down = point.copy(), point.copy()
-        up[i] += step
-        down[i] = max(down[i] - step, _LOWEST[i])
-        gained = after(counts, up).likely - after(counts, down).likely
-        out[:, i] = gained / (up[i] - down[i])
-    return out
-
-
-def _likely(counts: Counts, point: Floats) -> float:
-    return float(np.sum(after(counts, point).likely))
+    return max((np.append(values, size) for size in tried), key=lambda at: likely_at(counts, at))
 
 
 def _enough(near: Likeliest) -> int | None:
@@ -139,84 +85,17 @@ def _enough(near: Likeliest) -> int | None:
     return None
 
 
-def _inverse(slopes: Floats) -> Floats:
-    """Covariance by the outer products of slopes.
-
-    E. K. Berndt, B. H. Hall, R. E. Hall and J. A. Hausman, Annals of Economic and Social
-    Measurement 3, 1974.
-    """
-    scale = lengths(slopes)
-    scaled = slopes / scale
-    inverse = np.linalg.inv(scaled.T @ scaled + _RIDGE * np.eye(len(scale)))
-    return np.asarray(inverse / np.outer(scale, scale))
-
-
 def _held(found: Likeliest) -> Likeliest:
     """The same, the covariance narrower by what slopes hold values at their bounds with.
 
     Above its bound such a value has a density that falls at the slope.  Half of a normal stands for
     it, beyond which a twentieth lies where a twentieth of that does, to 13 %.
     """
-    steep = np.where(found.point <= _LOWEST, np.minimum(found.slopes.sum(axis=0), 0.0), 0.0)
+    steep = np.where(found.point <= LOWEST, np.minimum(found.slopes.sum(axis=0), 0.0), 0.0)
     sd = np.sqrt(np.diag(found.covariance))
     inner = np.linalg.inv(found.covariance / np.outer(sd, sd)) + np.diag(0.5 * (steep * sd) ** 2)
     held = np.linalg.inv(inner) * np.outer(sd, sd)
     return replace(found, covariance=held, past=-steep * sd)
-
-
-def _first_sd(counts: Counts, point: Floats) -> Floats:
-    """What standard deviations may be at most, shape (6,), before anything is known of them."""
-    size = float(np.std(counts.command))
-    mass, damping = point[[MASS, DAMPING]]
-    moves = [0.02 * mass, 0.06 * max(damping, mass), 0.02 * size, 0.02 * size]
-    return np.array([*moves, 0.2 * counts.period_s, 0.2])
-
-
-def _ascend(counts: Counts, start: Floats, settled: float, steps: int = _STEPS) -> Likeliest:
-    """Steps of Levenberg and Marquardt, the information by the slopes' outer products."""
-    point, likely, damped = start, _likely(counts, start), 1e-3
-    most = _first_sd(counts, point)
-    sd = most / 3
-    done = False
-    for _ in range(steps):
-        slopes = slopes_of(counts, point, sd)
-        covariance = _inverse(slopes)
-        sd = np.clip(np.sqrt(np.diag(covariance)), most / 150, most)
-        better, gain = None, 0.0
-        for _ in range(_TRIALS):
-            trial = _moved(point, slopes, damped)
-            gain = _likely(counts, trial) - likely
-            if gain > 0:
-                better = trial
-                break
-            damped = max(8 * damped, 1e-3)
-        if better is not None:
-            point, likely, damped = better, likely + gain, max(damped / 8, 1e-6)
-        done = better is None or gain < settled
-        if done:
-            break
-    return Likeliest(counts, point, likely, slopes, covariance, done)
-
-
-def _moved(point: Floats, slopes: Floats, damped: float) -> Floats:
-    """A damped step that keeps to what is possible: values at their bounds do not pull others."""
-    scale = lengths(slopes)
-    scaled = slopes / scale
-    free = np.ones(len(point), dtype=bool)
-    step = np.zeros(len(point))
-    for _ in range(len(point)):
-        some = scaled[:, free]
-        step[:] = 0.0
-        inner = some.T @ some + damped * np.eye(some.shape[1])
-        step[free] = np.linalg.solve(inner, some.sum(axis=0)) / scale[free]
-        out = free & (point <= _LOWEST) & (step < 0)
-        if not np.any(out):
-            break
-        free &= ~out
-    moved = np.maximum(point + step, _LOWEST)
-    moved[MASS] = np.clip(moved[MASS], 0.5 * point[MASS], 2 * point[MASS])
-    moved[WHITE] = np.clip(moved[WHITE], point[WHITE] - 1.5, point[WHITE] + 1.5)
-    return np.asarray(moved)
 
 
 def _places(found: Likeliest, delay_s: float, delay_sd: float) -> list[Likeliest]:
@@ -234,13 +113,13 @@ def _places(found: Likeliest, delay_s: float, delay_sd: float) -> list[Likeliest
         point[DELAY] = delay
         possible = 0.5 < point[MASS] / found.point[MASS] < 2
         if abs(off) > _SAME * counts.period_s and possible:
-            tried.append(np.maximum(point, _LOWEST))
-    likely = np.array([-np.inf, *(_likely(counts, one) for one in tried), -np.inf])
+            tried.append(np.maximum(point, LOWEST))
+    likely = np.array([-np.inf, *(likely_at(counts, one) for one in tried), -np.inf])
     tops = np.flatnonzero((likely[1:-1] >= likely[:-2]) & (likely[1:-1] >= likely[2:]))
     best = sorted(tops.tolist(), key=lambda i: -likely[i + 1])[:_PLACES]
     places = [found]
     for i in best:
-        other = _ascend(counts, tried[i], _ABOUT, _FEW)
+        other = ascend(counts, tried[i], _ABOUT, _FEW)
         off = min(abs(other.point[DELAY] - place.point[DELAY]) for place in places)
         if off > _SAME * counts.period_s:
             places.append(other)
@@ -290,12 +169,12 @@ def _wider(
     `best` is the likeliest point met before, with its likelihood; it is handed on.
     """
     times = 1.0
-    for _ in range(_TRIALS):
+    for _ in range(TRIALS):
         ends = [found.point + side * _AWAY * times * axis for side in (-1, 1)]
-        ends = [end for end in ends if np.all(end >= _LOWEST)]
+        ends = [end for end in ends if np.all(end >= LOWEST)]
         if not ends:
             break
-        likely = [_likely(found.counts, end) for end in ends]
+        likely = [likely_at(found.counts, end) for end in ends]
         if max(likely) > best[1]:
             best = ends[int(np.argmax(likely))], max(likely)
         fell = (found.likely - float(np.mean(likely))) / (0.5 * _AWAY**2)
