@@ -34,8 +34,9 @@ def assumptions(analysis: Analysis, closed: Closed | None = None) -> tuple[str, 
         "fraction of a period, are computed exactly, not by a continuous approximation.",
         words.delay(analysis),
         "Command and position stand in the recording as they were sent and read. What was done to "
-        "one of them in the record alone (a mean of commands, a drift taken off the position) "
-        "looks like a delay or a damping of the device, and the limit may then be too high.",
+        "one of them in the record alone (a mean of commands, a drift taken off the position, a "
+        "position that was integrated, which is half a period early) looks like more or less delay "
+        "or damping of the device, and the limit may then be too high.",
         f"The force is in command units ({unit}): a wrong force constant makes masses, dampers and "
         "springs wrong by its factor, but cancels in the stiffness that may be commanded.",
         _constancy(analysis, closed),

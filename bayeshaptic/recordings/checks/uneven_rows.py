@@ -1,0 +1,149 @@
+"""Whether rows lie unevenly in time, in a pattern that comes again and again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from bayeshaptic.errors import Notice
+from bayeshaptic.quantities import pure
+from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.filling import TINY, fit_predictor
+from bayeshaptic.types import Floats
+
+UNEVEN = "uneven rows"  # the topic of its warning
+_FEWEST_SAMPLES = 1000
+_ROWS = 1, 4, 12  # that a velocity is a mean over: encoders' counts show none in few
+_AROUND, _MOST = 401, 5.0  # rows whose sizes a product is beside, and the most it counts by
+_SLOWEST = 0.01  # cycles a row: slower ones are what a device does
+_APART = np.linspace(0.083, 0.917, 16)  # of the recording, by which error and velocity are moved
+# The height of the line, over the mean of its neighbours; how much higher than with both moved
+# apart; and the least width, in rows, of a pattern that rows have, and not what filled them.
+_LEAST, _HIGHER, _WIDE = 35.0, 5.0, 0.1
+
+
+class _Pattern(NamedTuple):
+    """How rows are early and late: how often, by how much, and how clearly.
+
+    Attributes
+    ----------
+    frequency : float
+        Cycles a row.
+    width : float
+        Rows, from the earliest to the latest.
+    height, moved : float
+        Of the line in the products of error and velocity, over their mean, and the highest at its
+        place with errors and velocities moved apart.
+    """
+
+    frequency: float
+    width: float
+    height: float
+    moved: float
+
+
+def uneven_rows(recording: Recording) -> list[Notice]:
+    """That rows are early and late by turns, as the newest ones of a loop of another rate.
+
+    A row that is late shows the device where it is by then: what its past foretells of the position
+    is off by the velocity times how late it is.  So that error, times a velocity of before, holds
+    a line where rows are late in a pattern, and no other if the device is what it was.  Periodic
+    motion, whose errors have lines of their own, holds it with errors and velocities moved apart,
+    too.
+
+    Parameters
+    ----------
+    recording : Recording
+    """
+    told = any(n.topic in {"period", "held position"} for n in recording.notices)
+    if told or recording.joints or recording.samples < _FEWEST_SAMPLES:
+        return []
+    found = _pattern(recording.position, recording.force)
+    if found is None or found.height < max(_LEAST, _HIGHER * found.moved) or found.width < _WIDE:
+        return []
+    text = (
+        "Rows are not evenly apart in time: by turns, in a pattern that comes again and again, "
+        f"some are later than others by {pure(min(found.width, 1.0), 1)} of a period or more, as "
+        "where a log writes the newest row of a loop of another rate, rows are lost at regular "
+        "times, or a recording was brought to another rate. Commands that are not written down "
+        "then move the device, and what is seen of its delay and its noise is that of no loop. "
+        "Write every row of the loop down."
+    )
+    return [Notice("warning", UNEVEN, text)]
+
+
+def doubts_of_the_rows(notices: Iterable[Notice]) -> list[str]:
+    """Why no stiffness follows where rows are early and late by turns."""
+    if not any(n.topic == UNEVEN for n in notices):
+        return []
+    return [
+        "its rows are not evenly apart in time, as where a log writes the newest row of a loop of "
+        "another rate: write every row of the loop down"
+    ]
+
+
+def _pattern(position: Floats, force: Floats) -> _Pattern | None:
+    """The clearest, by any of the velocities; None where nothing is left to chance."""
+    predictor = fit_predictor(position, force, np.zeros(len(position), dtype=bool))
+    if predictor is None or predictor.spread <= TINY * np.std(position):
+        return None
+    errors = predictor.errors(position, force)
+    error = np.clip(errors / predictor.spread, -_MOST, _MOST)
+    velocities = [_velocity(position, rows) for rows in _ROWS]
+    lines = [_lines(error, _beside(velocity)) for velocity in velocities]
+    clearest = int(np.argmax([line.max() for line in lines]))
+    velocity, heights = velocities[clearest], lines[clearest]
+    beside = _beside(velocity)
+    best = int(np.argmax(heights))
+    near = slice(max(best - 2, 0), best + 3)
+    shifts = [_again(beside), *(_APART * len(error)).astype(int)]
+    moved = max(float(_lines(error, np.roll(beside, shift))[near].max()) for shift in shifts)
+    frequency = best / (2 * (len(heights) - 1))
+    # A row that is late by a part of a period leaves an error of so many steps, after what the
+    # predictor makes of rows that were late before. Of a saw-tooth, as this pattern is, the first
+    # harmonic is its width over 2 pi.
+    turning = np.exp(-2j * np.pi * frequency * np.arange(len(errors)))
+    late = np.sum(errors * velocity * turning) / max(velocity @ velocity, np.finfo(float).tiny)
+    passed = predictor.past @ turning[: len(predictor.past)]
+    width = float(2 * np.pi * abs(late) / abs(passed))
+    return _Pattern(frequency, width, float(heights[best]), moved)
+
+
+def _velocity(position: Floats, rows: int) -> Floats:
+    """The mean of as many steps before each sample, per row; zero at the first ones."""
+    velocity = np.zeros(len(position))
+    velocity[rows + 1 :] = (position[rows:-1] - position[: -rows - 1]) / rows
+    return velocity
+
+
+def _beside(velocity: Floats) -> Floats:
+    """Each velocity over those around it."""
+    from scipy.ndimage import uniform_filter1d
+
+    usual = np.sqrt(np.maximum(uniform_filter1d(velocity**2, _AROUND), 0))
+    least = 1e-3 * velocity.std() + np.finfo(float).tiny
+    return np.clip(velocity / (usual + least), -_MOST, _MOST)
+
+
+def _again(velocity: Floats) -> int:
+    """After how many rows it is most like itself, a period where it has one."""
+    from scipy.signal import correlate
+
+    like = np.abs(correlate(velocity, velocity, method="fft")[len(velocity) - 1 :])
+    lags = slice(_AROUND, len(velocity) // 2)
+    overlap = len(velocity) - np.arange(len(velocity))
+    return _AROUND + int(np.argmax(like[lags] / overlap[lags]))
+
+
+def _lines(error: Floats, beside: Floats) -> Floats:
+    """Power of their products at frequencies up to half a cycle a row, over its mean."""
+    from scipy.fft import next_fast_len, rfft
+
+    product = error * beside
+    product -= product.mean()
+    length = 2 * next_fast_len(len(error), real=True)
+    power: Floats = np.abs(rfft(product, length)) ** 2
+    power[: int(np.ceil(_SLOWEST * length))] = 0.0
+    return power / max(float(product @ product), np.finfo(float).tiny)
