@@ -13,7 +13,7 @@ from bayeshaptic.errors import InputError, Notice, such
 from bayeshaptic.recordings.readers.numbers import as_numbers
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
-from bayeshaptic.recordings.signals.runs import (
+from bayeshaptic.recordings.signals.rows.runs import (
     force_held,
     force_held_unevenly,
     held_for,
@@ -25,7 +25,8 @@ from bayeshaptic.recordings.signals.runs import (
     rows_alike,
     written_each,
 )
-from bayeshaptic.recordings.signals.timing import Timing, sampling_period
+from bayeshaptic.recordings.signals.rows.timing import Timing, sampling_period
+from bayeshaptic.recordings.signals.rows.uneven_rows import uneven_rows
 from bayeshaptic.recordings.signals.turns import unwrapped, without_jumps
 from bayeshaptic.recordings.units import assumed_units, base_unit, choose_units
 from bayeshaptic.types import Floats, Ints
@@ -160,7 +161,7 @@ def _continued(
     position, notices = unwrapped(signals.position, angle, count, where)
     signals = replace(signals, position=position)
     if timing.rows is not None:
-        from bayeshaptic.recordings.signals.gaps import put_back
+        from bayeshaptic.recordings.signals.rows.gaps import put_back
 
         signals = _Signals(*put_back(**vars(signals), rows=timing.rows, where=where))
     position, joints, jumps = without_jumps(signals.position, signals.force, timing.period_s)
@@ -200,6 +201,12 @@ def _a_row_a_period(rows: _Rows, held: int, stamped: bool, told_s: float | None)
         said = (force_held_unevenly(mean, period_s),)
     elif (late := held_for(signals.position)) > 1:
         said = (position_held(late, period_s),)
+    elif (
+        told_s is None
+        and not rows.joints
+        and (uneven := uneven_rows(signals.force, signals.position, period_s))
+    ):
+        said = (uneven,)
     else:
         said = ()
     return replace(rows, notices=rows.notices + said)

@@ -17,7 +17,6 @@ from bayeshaptic.effects.nonlinear.shapes import ALONG, LOAD_VELOCITY, VELOCITY
 from bayeshaptic.quantities import percent, pure, quantity
 from bayeshaptic.recordings.checks.loop_period import doubts_of_the_loop
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
-from bayeshaptic.recordings.checks.uneven_rows import doubts_of_the_rows
 from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, how_computed, is_certain
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP
@@ -108,7 +107,7 @@ def _of_the_loop(closed: Closed) -> list[str]:
 def _of_the_analysis(analysis: Analysis, diagnosis: Any) -> list[str]:
     verdict = (diagnosis or {}).get("verdict")
     return [
-        *doubts_of_the_rows(analysis.notices),
+        *doubts_of_the_loop(analysis.notices),
         *_of_the_misfit(analysis, verdict),
         *_of_the_recording(analysis, diagnosis, verdict),
         *_of_the_limit(analysis),
@@ -138,7 +137,6 @@ def _of_the_misfit(analysis: Analysis, verdict: str | None) -> list[str]:
 def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -> list[str]:
     found = []
     found += _of_the_units(analysis)
-    found += doubts_of_the_loop(analysis.notices)
     if analysis.in_loop is not None:
         found += [*analysis.in_loop.doubts, *analysis.in_loop.questions]
     if has_feedback(analysis.notices) and analysis.in_loop is None:

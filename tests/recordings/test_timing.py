@@ -10,8 +10,8 @@ from bayeshaptic.errors import InputError
 from bayeshaptic.recordings import Recording, recording_from_arrays
 from bayeshaptic.recordings.checks.loop_period import doubts_of_the_loop, without_doubt
 from bayeshaptic.recordings.checks.two_clocks import two_clocks
-from bayeshaptic.recordings.signals.runs import held_for, held_unevenly
-from bayeshaptic.recordings.signals.timing import sampling_period
+from bayeshaptic.recordings.signals.rows.runs import held_for, held_unevenly
+from bayeshaptic.recordings.signals.rows.timing import sampling_period
 from bayeshaptic.types import Floats, Ints
 
 RNG = np.random.default_rng(3)

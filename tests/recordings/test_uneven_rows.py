@@ -7,7 +7,8 @@ import pytest
 from scipy.signal import lfilter
 
 from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.recordings.checks.uneven_rows import doubts_of_the_rows, uneven_rows
+from bayeshaptic.recordings.checks.loop_period import doubts_of_the_loop
+from bayeshaptic.recordings.signals.rows.uneven_rows import uneven_rows
 from bayeshaptic.types import Floats
 
 ROWS = 12_000
@@ -26,12 +27,17 @@ def test_the_newest_rows_of_a_faster_loop_are_uneven(faster: float) -> None:
     force = np.random.default_rng(1).standard_normal(int(faster * ROWS) + 1)
     newest = np.floor(faster * np.arange(ROWS)).astype(int)
     moved = moved_by(force, 2)
-    (told,) = uneven_rows(recording_from_arrays(force[newest], moved[newest], 1e-3))
-    assert doubts_of_the_rows([told])
+    stamps = 1e-3 * np.arange(ROWS)
+    found = recording_from_arrays(force[newest], moved[newest], time=stamps)
+    (doubt,) = doubts_of_the_loop(found.notices)
+    assert "not evenly apart" in doubt
+    # A loop that runs at every row, and whose sensor has a clock of its own.
+    said = recording_from_arrays(force[newest], moved[newest], 1e-3, time=stamps)
+    assert not doubts_of_the_loop(said.notices)
     # One row in `step` is even.
     step = max(2, round(faster))
-    assert not uneven_rows(recording_from_arrays(force[::step], moved[::step], 1e-3))
-    assert not uneven_rows(recording_from_arrays(force[:ROWS], moved[:ROWS], 1e-3))
+    for every in (slice(0, step * (len(force) // step), step), slice(ROWS)):
+        assert uneven_rows(force[every], moved[every], 1e-3) is None
 
 
 @pytest.mark.parametrize("period", [100, 200, 400])
@@ -40,4 +46,4 @@ def test_motion_that_repeats_has_lines_of_its_own(period: int) -> None:
     rng = np.random.default_rng(3)
     force = np.tile(rng.standard_normal(period), ROWS // period)
     moved = moved_by(force, 4, count=1e-3)
-    assert not uneven_rows(recording_from_arrays(force, moved, 1e-3))
+    assert uneven_rows(force, moved, 1e-3) is None

@@ -23,7 +23,7 @@ from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.signals.lone import without_lone
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP, with_loop_delay
-from bayeshaptic.recordings.signals.timing import unusual_period
+from bayeshaptic.recordings.signals.rows.timing import unusual_period
 from bayeshaptic.recordings.through_reference import through_reference, too_weak
 from bayeshaptic.threads import single_threaded
 

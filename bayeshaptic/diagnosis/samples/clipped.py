@@ -6,7 +6,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.samples.prediction import Samples
-from bayeshaptic.recordings.signals.runs import runs
+from bayeshaptic.recordings.signals.rows.runs import runs
 from bayeshaptic.types import Bools, Floats
 
 # A motion that comes from rest has gone a quarter of the way in half of the time; one that comes

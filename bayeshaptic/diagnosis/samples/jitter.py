@@ -9,7 +9,7 @@ from scipy.signal import savgol_filter
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.samples.prediction import Samples
-from bayeshaptic.recordings.signals.timing import NOTABLE_JITTER
+from bayeshaptic.recordings.signals.rows.timing import NOTABLE_JITTER
 from bayeshaptic.types import Floats
 
 _BLOCK = 100  # samples whose errors may be alike

@@ -16,7 +16,7 @@ from scipy.linalg import solveh_banded
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.samples.prediction import Samples
 from bayeshaptic.recordings.signals.filling import TINY, Predictor
-from bayeshaptic.recordings.signals.runs import runs
+from bayeshaptic.recordings.signals.rows.runs import runs
 from bayeshaptic.types import Bools, Floats
 
 BLOCK = 32  # samples that one look takes together

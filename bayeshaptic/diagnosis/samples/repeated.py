@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayeshaptic.diagnosis.samples.prediction import Samples
-from bayeshaptic.recordings.signals.runs import HUNG_S, runs
+from bayeshaptic.recordings.signals.rows.runs import HUNG_S, runs
 from bayeshaptic.recordings.signals.turns import hung
 from bayeshaptic.types import Bools, Floats, Ints
 

@@ -10,14 +10,13 @@ from bayeshaptic.recordings.checks.against_device import against_response, compa
 from bayeshaptic.recordings.checks.loop_period import without_doubt
 from bayeshaptic.recordings.checks.sufficiency import FEWEST_SAMPLES, says_nothing_of_the_actuator
 from bayeshaptic.recordings.checks.two_clocks import two_clocks
-from bayeshaptic.recordings.checks.uneven_rows import uneven_rows
 from bayeshaptic.recordings.checks.units_in_doubt import degrees, normalised, whole_numbers
 from bayeshaptic.recordings.checks.what_drives_what import what_drives_what
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.signals.rough_response import RoughResponse, rough_response
-from bayeshaptic.recordings.signals.timing import NOTABLE_JITTER, unusual_period
+from bayeshaptic.recordings.signals.rows.timing import NOTABLE_JITTER, unusual_period
 from bayeshaptic.recordings.units import refuse_mixed_units
 from bayeshaptic.types import Bools
 
@@ -39,8 +38,8 @@ def check_recording(recording: Recording, device: Device | None = None) -> tuple
     -------
     tuple of Notice
         Those of the recording itself, then by topic: "units", "time stamps", "resolution",
-        "two clocks", "uneven rows", "coherence", "two levels", "alignment", and "feedback" where
-        the force was computed from the motion.
+        "two clocks", "coherence", "two levels", "alignment", and "feedback" where the force was
+        computed from the motion.
 
     Raises
     ------
@@ -71,7 +70,6 @@ def check_recording(recording: Recording, device: Device | None = None) -> tuple
         *without_doubt(recording.notices, recording.period_s, device),
         *scales,
         *two_clocks(recording),
-        *uneven_rows(recording),
         *says_nothing_of_the_actuator(recording),
         *driven,
     )

@@ -6,7 +6,8 @@ from collections.abc import Iterable
 
 from bayeshaptic.devices import Device
 from bayeshaptic.errors import Notice
-from bayeshaptic.recordings.signals.timing import LOOP
+from bayeshaptic.recordings.signals.rows.timing import LOOP
+from bayeshaptic.recordings.signals.rows.uneven_rows import UNEVEN
 
 
 def doubts_of_the_loop(notices: Iterable[Notice]) -> list[str]:
@@ -15,8 +16,14 @@ def doubts_of_the_loop(notices: Iterable[Notice]) -> list[str]:
     The limit of a loop that is slower is lower, by as many times as its period is longer where
     delay and damping alone decide.
     """
-    if not any(n.topic == "period" and LOOP in n.about for n in notices):
+    doubts = [n for n in notices if n.topic == "period" and LOOP in n.about]
+    if not doubts:
         return []
+    if any(UNEVEN in n.about for n in doubts):
+        return [
+            "its rows are not evenly apart in time, as where a log writes the newest row of a loop "
+            "of another rate: write every row of the loop down"
+        ]
     return [
         "the force is held for several rows, so that the loop's period may be longer than that of "
         "a row and the limit lower: say the loop's period with --period-s"

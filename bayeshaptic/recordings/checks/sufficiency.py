@@ -18,7 +18,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.excitation import find_repetition
 from bayeshaptic.recordings.signals.raw_signals import clipping, increment_unit
 from bayeshaptic.recordings.signals.rough_response import rough_response
-from bayeshaptic.recordings.signals.runs import longest, runs
+from bayeshaptic.recordings.signals.rows.runs import longest, runs
 from bayeshaptic.recordings.signals.sweeps import moves_until
 from bayeshaptic.types import Bools, Floats
 

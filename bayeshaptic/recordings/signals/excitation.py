@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
-from bayeshaptic.recordings.signals.runs import longest
+from bayeshaptic.recordings.signals.rows.runs import longest
 
 # Excited lines lie at most 50 dB below the strongest.
 EXCITED = 1e-5

@@ -12,7 +12,7 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.signals.filling import ORDER, TINY, fit_predictor
 from bayeshaptic.recordings.signals.lone import AROUND, FARTHER
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
-from bayeshaptic.recordings.signals.runs import HUNG_S
+from bayeshaptic.recordings.signals.rows.runs import HUNG_S
 from bayeshaptic.types import Bools, Floats, Ints
 
 _TURN = 2 * np.pi

@@ -20,7 +20,7 @@ from bayeshaptic.models.response.system import LinearSystem
 from bayeshaptic.numerics.low_pass import ORDER
 from bayeshaptic.recordings.checks.sufficiency import standstill
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.signals.runs import runs
+from bayeshaptic.recordings.signals.rows.runs import runs
 from bayeshaptic.types import Floats
 
 # A hand wanders below this; what it does above falls so steeply that the velocity's whole band

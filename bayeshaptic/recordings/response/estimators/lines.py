@@ -13,7 +13,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.local_polynomial import window_edges
 from bayeshaptic.recordings.response.spectra import REPEATS_TO, RandomSpectra
 from bayeshaptic.recordings.response.window_reference import unit_mass
-from bayeshaptic.recordings.signals.timing import unusual_period
+from bayeshaptic.recordings.signals.rows.timing import unusual_period
 
 FEWEST_WINDOWS = 8
 # The lowest window then spans a factor 2.14: for 30 s and 24 lines, 0.7 to 1.5 Hz.

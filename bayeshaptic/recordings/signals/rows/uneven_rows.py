@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 
 from bayeshaptic.errors import Notice
 from bayeshaptic.quantities import pure
-from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.filling import TINY, fit_predictor
+from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.recordings.signals.rows.timing import LOOP
 from bayeshaptic.types import Floats
 
-UNEVEN = "uneven rows"  # the topic of its warning
+UNEVEN = "uneven rows"  # what its warning is about
 _FEWEST_SAMPLES = 1000
 _ROWS = 1, 4, 12  # that a velocity is a mean over: encoders' counts show none in few
+_COUNTS = 1.5  # that the device moves by in as many rows (rms)
 _AROUND, _MOST = 401, 5.0  # rows whose sizes a product is beside, and the most it counts by
 _SLOWEST = 0.01  # cycles a row: slower ones are what a device does
 _APART = np.linspace(0.083, 0.917, 16)  # of the recording, by which error and velocity are moved
@@ -44,8 +45,8 @@ class _Pattern(NamedTuple):
     moved: float
 
 
-def uneven_rows(recording: Recording) -> list[Notice]:
-    """That rows are early and late by turns, as the newest ones of a loop of another rate.
+def uneven_rows(force: Floats, position: Floats, period_s: float) -> Notice | None:
+    """A warning of rows that are early and late by turns; None where they are not.
 
     A row that is late shows the device where it is by then: what its past foretells of the position
     is off by the velocity times how late it is.  So that error, times a velocity of before, holds
@@ -55,50 +56,50 @@ def uneven_rows(recording: Recording) -> list[Notice]:
 
     Parameters
     ----------
-    recording : Recording
+    force, position : ndarray, shape (N,)
+    period_s : float
+        Of the rows.
     """
-    told = any(n.topic in {"period", "held position"} for n in recording.notices)
-    if told or recording.joints or recording.samples < _FEWEST_SAMPLES:
-        return []
-    found = _pattern(recording.position, recording.force)
-    if found is None or found.height < max(_LEAST, _HIGHER * found.moved) or found.width < _WIDE:
-        return []
+    if len(force) < _FEWEST_SAMPLES:
+        return None
+    found = _pattern(position, force)
+    if found is None or found.height < _HIGHER * found.moved or found.width < _WIDE:
+        return None
     text = (
         "Rows are not evenly apart in time: by turns, in a pattern that comes again and again, "
         f"some are later than others by {pure(min(found.width, 1.0), 1)} of a period or more, as "
         "where a log writes the newest row of a loop of another rate, rows are lost at regular "
         "times, or a recording was brought to another rate. Commands that are not written down "
         "then move the device, and what is seen of its delay and its noise is that of no loop. "
-        "Write every row of the loop down."
+        f"Write every row of the loop down, or say --period-s {period_s:.6g} where the loop runs "
+        "at every row and the sensor of the position alone has another clock."
     )
-    return [Notice("warning", UNEVEN, text)]
-
-
-def doubts_of_the_rows(notices: Iterable[Notice]) -> list[str]:
-    """Why no stiffness follows where rows are early and late by turns."""
-    if not any(n.topic == UNEVEN for n in notices):
-        return []
-    return [
-        "its rows are not evenly apart in time, as where a log writes the newest row of a loop of "
-        "another rate: write every row of the loop down"
-    ]
+    return Notice("warning", "period", text, (LOOP, UNEVEN))
 
 
 def _pattern(position: Floats, force: Floats) -> _Pattern | None:
-    """The clearest, by any of the velocities; None where nothing is left to chance."""
+    """The clearest, by any of the velocities; None where there is none."""
     predictor = fit_predictor(position, force, np.zeros(len(position), dtype=bool))
     if predictor is None or predictor.spread <= TINY * np.std(position):
         return None
     errors = predictor.errors(position, force)
     error = np.clip(errors / predictor.spread, -_MOST, _MOST)
-    velocities = [_velocity(position, rows) for rows in _ROWS]
+    # Of a position that moves by less than a count or two an error goes with the step before.
+    count = increment_unit(position) or 0.0
+    seen = [(rows, _velocity(position, rows)) for rows in _ROWS]
+    velocities = [velocity for rows, velocity in seen if rows * velocity.std() > _COUNTS * count]
+    if not velocities:
+        return None
     lines = [_lines(error, _beside(velocity)) for velocity in velocities]
     clearest = int(np.argmax([line.max() for line in lines]))
     velocity, heights = velocities[clearest], lines[clearest]
     beside = _beside(velocity)
     best = int(np.argmax(heights))
+    if heights[best] < _LEAST:
+        return None
     near = slice(max(best - 2, 0), best + 3)
-    shifts = [_again(beside), *(_APART * len(error)).astype(int)]
+    periods = [_again(signal) for signal in (beside, error, force - force.mean())]
+    shifts = [*periods, *(_APART * len(error)).astype(int)]
     moved = max(float(_lines(error, np.roll(beside, shift))[near].max()) for shift in shifts)
     frequency = best / (2 * (len(heights) - 1))
     # A row that is late by a part of a period leaves an error of so many steps, after what the
@@ -127,13 +128,13 @@ def _beside(velocity: Floats) -> Floats:
     return np.clip(velocity / (usual + least), -_MOST, _MOST)
 
 
-def _again(velocity: Floats) -> int:
+def _again(signal: Floats) -> int:
     """After how many rows it is most like itself, a period where it has one."""
     from scipy.signal import correlate
 
-    like = np.abs(correlate(velocity, velocity, method="fft")[len(velocity) - 1 :])
-    lags = slice(_AROUND, len(velocity) // 2)
-    overlap = len(velocity) - np.arange(len(velocity))
+    like = np.abs(correlate(signal, signal, method="fft")[len(signal) - 1 :])
+    lags = slice(_AROUND, len(signal) // 2)
+    overlap = len(signal) - np.arange(len(signal))
     return _AROUND + int(np.argmax(like[lags] / overlap[lags]))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from bayeshaptic.errors import Notice
 from bayeshaptic.quantities import quantity
-from bayeshaptic.recordings.signals.timing import LOOP
+from bayeshaptic.recordings.signals.rows.timing import LOOP
 from bayeshaptic.types import Bools, Floats, Ints
 
 # Seconds that a reading hangs for at most; a device that rests does so for longer. Of 300 that hang
