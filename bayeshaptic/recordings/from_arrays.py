@@ -191,22 +191,25 @@ def _a_row_a_period(rows: _Rows, held: int, stamped: bool, told_s: float | None)
     if often > 1:
         joints = tuple(-((first - joint) // often) for joint in rows.joints)
         return _once(rows, signals[first::often], float(often), joints)
-    if held > 1 and not (stamped and told_s is not None):
-        said: tuple[Notice, ...] = (force_held(signals.force, held, period_s, stamped),)
-    elif held == 1 and told_s is None and (mean := held_unevenly(signals.force)) > 1:
+    # Beside stamps the period that was said is the loop's; else it is that of the rows.
+    asked = not (stamped and told_s is not None)
+    said: tuple[Notice, ...]
+    if held > 1 and asked:
+        said = (force_held(signals.force, held, period_s, stamped),)
+    elif held == 1 and asked and (mean := held_unevenly(signals.force)) > 1:
         new = new_rows(signals.force, signals.position, mean)
         if new is not None:
             joints = tuple(np.searchsorted(new, rows.joints).tolist())
             return _once(rows, signals[new], mean, joints)
-        said = (force_held_unevenly(mean, period_s),)
+        said = (force_held_unevenly(mean, period_s, stamped),)
     elif (late := held_for(signals.position)) > 1:
         said = (position_held(late, period_s),)
     elif (
-        told_s is None
+        asked
         and not rows.joints
-        and (uneven := uneven_rows(signals.force, signals.position, period_s))
+        and (late_by := uneven_rows(signals.force, signals.position, period_s, stamped))
     ):
-        said = (uneven,)
+        said = (late_by,)
     else:
         said = ()
     return replace(rows, notices=rows.notices + said)

@@ -34,10 +34,13 @@ def test_the_newest_rows_of_a_faster_loop_are_uneven(faster: float) -> None:
     # A loop that runs at every row, and whose sensor has a clock of its own.
     said = recording_from_arrays(force[newest], moved[newest], 1e-3, time=stamps)
     assert not doubts_of_the_loop(said.notices)
+    # Without stamps the period is that of the rows, and says nothing of the loop's.
+    bare = recording_from_arrays(force[newest], moved[newest], 1e-3)
+    assert any("not evenly apart" in notice.text for notice in bare.notices)
     # One row in `step` is even.
     step = max(2, round(faster))
     for every in (slice(0, step * (len(force) // step), step), slice(ROWS)):
-        assert uneven_rows(force[every], moved[every], 1e-3) is None
+        assert uneven_rows(force[every], moved[every], 1e-3, True) is None
 
 
 @pytest.mark.parametrize("period", [100, 200, 400])
@@ -46,4 +49,4 @@ def test_motion_that_repeats_has_lines_of_its_own(period: int) -> None:
     rng = np.random.default_rng(3)
     force = np.tile(rng.standard_normal(period), ROWS // period)
     moved = moved_by(force, 4, count=1e-3)
-    assert uneven_rows(force, moved, 1e-3) is None
+    assert uneven_rows(force, moved, 1e-3, True) is None

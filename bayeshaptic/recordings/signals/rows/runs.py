@@ -241,18 +241,21 @@ def force_held(force: Floats, rows: int, period_s: float, stamped: bool) -> Noti
     return Notice("warning", "period", text, (LOOP,) if levels and stamped else ())
 
 
-def force_held_unevenly(rows: float, period_s: float) -> Notice:
+def force_held_unevenly(rows: float, period_s: float, stamped: bool) -> Notice:
     """A warning of a loop that runs at another rate than the rows, which no row is in time with."""
     text = (
         f"The force is held for {rows:.3g} rows in the mean, by a clock that beats with that of "
         f"the rows: as where a log writes the newest command of a loop of "
         f"{quantity(rows * period_s, 's')}, or a recording was brought to another rate afterwards. "
         f"Commands then stand up to {quantity(period_s, 's')} after their time, which looks like "
-        "less delay than the loop has, and its limit is lower. Record the loop's own rows, or say "
-        f"--period-s {period_s:.6g} where the loop runs at every row and the excitation alone was "
-        "held."
+        "less delay than the loop has, and its limit is lower. Record the loop's own rows"
     )
-    return Notice("warning", "period", text, (LOOP,))
+    if stamped:
+        text += (
+            f", or say --period-s {period_s:.6g} where the loop runs at every row and the "
+            "excitation alone was held"
+        )
+    return Notice("warning", "period", f"{text}.", (LOOP,) if stamped else ())
 
 
 def position_held(rows: int, period_s: float) -> Notice:

@@ -45,7 +45,7 @@ class _Pattern(NamedTuple):
     moved: float
 
 
-def uneven_rows(force: Floats, position: Floats, period_s: float) -> Notice | None:
+def uneven_rows(force: Floats, position: Floats, period_s: float, stamped: bool) -> Notice | None:
     """A warning of rows that are early and late by turns; None where they are not.
 
     A row that is late shows the device where it is by then: what its past foretells of the position
@@ -59,6 +59,8 @@ def uneven_rows(force: Floats, position: Floats, period_s: float) -> Notice | No
     force, position : ndarray, shape (N,)
     period_s : float
         Of the rows.
+    stamped : bool
+        Whether time stamps say so: then ``--period-s`` can say that the loop has it, too.
     """
     if len(force) < _FEWEST_SAMPLES:
         return None
@@ -71,10 +73,14 @@ def uneven_rows(force: Floats, position: Floats, period_s: float) -> Notice | No
         "where a log writes the newest row of a loop of another rate, rows are lost at regular "
         "times, or a recording was brought to another rate. Commands that are not written down "
         "then move the device, and what is seen of its delay and its noise is that of no loop. "
-        f"Write every row of the loop down, or say --period-s {period_s:.6g} where the loop runs "
-        "at every row and the sensor of the position alone has another clock."
+        "Write every row of the loop down"
     )
-    return Notice("warning", "period", text, (LOOP, UNEVEN))
+    if stamped:
+        text += (
+            f", or say --period-s {period_s:.6g} where the loop runs at every row and the sensor "
+            "of the position alone has another clock"
+        )
+    return Notice("warning", "period", f"{text}.", (LOOP, UNEVEN) if stamped else ())
 
 
 def _pattern(position: Floats, force: Floats) -> _Pattern | None:
