@@ -15,7 +15,7 @@ from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.shapes import ALONG, LOAD_VELOCITY, VELOCITY
 from bayeshaptic.quantities import percent, pure, quantity
-from bayeshaptic.recordings.checks.loop_period import doubts_of_the_loop
+from bayeshaptic.recordings.checks.loop_period import doubts_of_the_loop, rows_are_uneven
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, how_computed, is_certain
@@ -61,6 +61,8 @@ def why_none(result: Result) -> tuple[str, ...]:
     analysis, closed = result.analysis, result.closed
     if told_too_little(analysis.notices) and (reason := unstated(analysis)) is not None:
         return (reason,)
+    if rows_are_uneven(analysis.notices):  # what else is seen of them comes of it
+        return tuple(doubts_of_the_loop(analysis.notices))
     found = _of_the_analysis(analysis, closed.diagnosis if closed else None)
     return tuple(found + (_of_the_loop(closed) if closed else []))
 
@@ -107,7 +109,6 @@ def _of_the_loop(closed: Closed) -> list[str]:
 def _of_the_analysis(analysis: Analysis, diagnosis: Any) -> list[str]:
     verdict = (diagnosis or {}).get("verdict")
     return [
-        *doubts_of_the_loop(analysis.notices),
         *_of_the_misfit(analysis, verdict),
         *_of_the_recording(analysis, diagnosis, verdict),
         *_of_the_limit(analysis),
@@ -137,6 +138,7 @@ def _of_the_misfit(analysis: Analysis, verdict: str | None) -> list[str]:
 def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -> list[str]:
     found = []
     found += _of_the_units(analysis)
+    found += doubts_of_the_loop(analysis.notices)
     if analysis.in_loop is not None:
         found += [*analysis.in_loop.doubts, *analysis.in_loop.questions]
     if has_feedback(analysis.notices) and analysis.in_loop is None:

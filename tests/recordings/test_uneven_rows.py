@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.checks.loop_period import doubts_of_the_loop
 from bayeshaptic.recordings.signals.rows.uneven_rows import uneven_rows
+from bayeshaptic.report.headline import headline
+from bayeshaptic.report.page.next_step import next_steps
+from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.types import Floats
 
 ROWS = 12_000
@@ -50,3 +54,20 @@ def test_motion_that_repeats_has_lines_of_its_own(period: int) -> None:
     force = np.tile(rng.standard_normal(period), ROWS // period)
     moved = moved_by(force, 4, count=1e-3)
     assert uneven_rows(force, moved, 1e-3, True) is None
+
+
+def test_a_page_asks_for_every_row_and_gives_no_other_reason() -> None:
+    made = simulate(Bench.from_device("phantom"), WhiteNoise(0.05, 200.0, 0.7, 6.0), seed=4)
+    newest = np.floor(1.3 * np.arange(int(len(made.force) / 1.3))).astype(int)
+    found = recording_from_arrays(
+        made.force[newest],
+        made.position[newest],
+        time=1e-3 * np.arange(len(newest)),
+        force_unit="Nm",
+        position_unit="rad",
+    )
+    closed = close_loop(found, "free", hidden=False)
+    said = headline(closed)
+    assert said.status == "untrusted" and said.sentence.endswith("of another rate.")
+    every, alone = next_steps(said, closed)
+    assert "every row" in every.text and alone.command.endswith("--period-s 0.001")

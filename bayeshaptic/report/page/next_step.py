@@ -11,6 +11,7 @@ from bayeshaptic.diagnosis.base.high_passed import TOPIC as HIGH_PASSED
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.recordings.checks.against_device import says_the_mass
 from bayeshaptic.recordings.checks.check import USUAL_SECONDS
+from bayeshaptic.recordings.checks.loop_period import rows_are_uneven
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
@@ -65,6 +66,8 @@ def next_steps(
     device = _device(result) + _said(options, _KEPT)
     analysis, command = result.analysis, f"bayeshaptic report {_source(result)}{device}"
     new = f"bayeshaptic report NEW.csv{device}"
+    if rows_are_uneven(analysis.notices):
+        return _after_uneven_rows(result, command, new)
     if has_feedback(analysis.notices):
         if options.get("model") == "rigid":
             return _in_open_loop(new), Step(_NOT_ONE_MASS, command)
@@ -109,6 +112,20 @@ def _after_doubtful_units(result: Result, options: Mapping[str, Any]) -> tuple[S
         f"{table}, a line each):",
         f"{source} --device MINE.toml{_said(options, _KEPT)}",
     )
+
+
+def _after_uneven_rows(result: Result, command: str, new: str) -> tuple[Step, ...]:
+    """Where a log may have written the newest rows of a loop of another rate."""
+    recording = result.measured.recording
+    every = Step("Write every row of the loop down, at the loop's own rate. Then:", new)
+    if recording is None:
+        return (every,)
+    alone = Step(
+        "Or say so, if the loop does run at every row, and the sensor of the position alone has "
+        "another clock. This recording will do:",
+        f"{command} --period-s {recording.period_s:.6g}",
+    )
+    return every, alone
 
 
 def _after_filter(result: Result, command: str, new: str) -> tuple[Step, ...]:
