@@ -24,7 +24,7 @@ from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.feedback import doubts, has_feedback
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel, finite, witnesses
 from bayeshaptic.report.numbers.result import tip_limit
-from bayeshaptic.report.numbers.rows import ParameterRow, Rows
+from bayeshaptic.report.numbers.rows import ParameterRow, Rows, scale_of
 from bayeshaptic.report.numbers.trust import doubtful_parameters
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def parameters(result: Result) -> tuple[ParameterRow, ...]:
     fit, posterior, model = analysis.fit, analysis.stated, analysis.model
     rows = []
     for i, (name, found) in enumerate(posterior.summary().items()):
-        row = scale((found["q50"], found["q95"]), found["unit"])
+        row = scale_of(posterior.draws[:, i], found["unit"])
         value, sd = float(fit.theta[i]), finite(fit.sd[i])
         low, high = (row.number(found[q], found["sd"], least=0) for q in ("q05", "q95"))
         remarks = [_OUTCOMES.get(fit.outcome.get(name, ""), "")]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 import re
+from dataclasses import replace
 from html import unescape
 from pathlib import Path
 
@@ -16,10 +17,11 @@ from test_measured import PERIOD_S, servo
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.closed import Closed
-from bayeshaptic.diagnosis.feedback.explain import explain_force
+from bayeshaptic.diagnosis.feedback.explain import ForceExplained, explain_force
 from bayeshaptic.recordings import recording_from_arrays, through_reference
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.report.figures.loop import inverse
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop import force_words, words
 from bayeshaptic.rig import Bench, run_loop
@@ -84,6 +86,21 @@ def test_a_servo_without_friction_gets_none() -> None:
     assert abs(mass - 90.0) < max(4 * sd, 0.9)
     said = force_words.in_short(force, "N") + force_words.found(force, "N", "")
     assert "friction" not in said
+
+
+def test_equations_that_are_alike_are_shown_once(closed: Closed) -> None:
+    force = closed.force
+    assert force is not None
+    for count, heads in ((1, ("", "estimate")), (2, ("", "with the term added"))):
+        further = replace(force.further, steps=force.further.steps[:count])
+        told = ForceExplained(further if count == 1 else force.first, further)
+        assert force_words.coefficient_heads(told) == heads
+        assert {len(row) for row in force_words.coefficients(told)} == {2}
+        assert "first term" not in force_words.remains(told, closed.analysis)
+        figure = inverse.draw(replace(closed, force=told))
+        assert len(figure.axes[0].get_legend().get_texts()) == count
+    several = replace(force.further, steps=force.further.steps[:1] * 3)
+    assert len(force_words.fits(ForceExplained(force.first, several))) == 2
 
 
 def test_what_does_not_move_as_one_mass_or_is_too_short_is_left_to_the_response() -> None:

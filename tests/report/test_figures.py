@@ -10,15 +10,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_analysis import CASES, fake_analysis
+from fake_analysis import CASES, fake_analysis, fake_closed
 
-from bayeshaptic.report.figures import marginals, stiffness
+from bayeshaptic.quantities import scale
+from bayeshaptic.report.figures import marginals, pairs, residuals, stiffness
 from bayeshaptic.report.figures.drawing.look import own_look
+from bayeshaptic.report.figures.loop import tests as loop_tests
 from bayeshaptic.report.figures.pairs import correlation, strongest
 from bayeshaptic.report.figures.pictures import PICTURES
 from bayeshaptic.report.figures.sampler import rank_histogram
 from bayeshaptic.report.figures.style import drawn
 from bayeshaptic.report.numbers.octaves import third_octaves
+from bayeshaptic.report.tables import parameters
 
 
 def test_third_octaves_hold_pure_noise() -> None:
@@ -84,7 +87,7 @@ def test_no_text_of_a_figure_covers_another_or_is_cut_off(
         boxes = list(drawn_texts)
         assert sum(1 + text.count("\n") for _, text in boxes) > 10, picture.name
         canvas = figure.bbox
-        for index, (box, text) in enumerate(boxes):
+        for box, text in boxes:
             inside = (
                 box.x0 > canvas.x0 - 1
                 and box.y0 > canvas.y0 - 1
@@ -92,10 +95,66 @@ def test_no_text_of_a_figure_covers_another_or_is_cut_off(
                 and box.y1 < canvas.y1 + 1
             )
             assert inside, (picture.name, text)
-            for other, words in boxes[index + 1 :]:
-                wide = min(box.x1, other.x1) - max(box.x0, other.x0)
-                high = min(box.y1, other.y1) - max(box.y0, other.y0)
-                assert wide < 1.5 or high < 1.5, (picture.name, text, words)
+        assert not covered(boxes), picture.name
+
+
+def covered(boxes: list[Any]) -> list[tuple[str, str]]:
+    """Pairs of texts of which one covers the other."""
+    found = []
+    for index, (box, text) in enumerate(boxes):
+        for other, words in boxes[index + 1 :]:
+            wide = min(box.x1, other.x1) - max(box.x0, other.x0)
+            high = min(box.y1, other.y1) - max(box.y0, other.y0)
+            if wide >= 1.5 and high >= 1.5:
+                found.append((text, words))
+    return found
+
+
+@pytest.mark.parametrize("size", [8.0, 60.0, 4000.0])
+def test_numbers_of_a_residual_over_decades_have_room(size: float, drawn_texts: list[Any]) -> None:
+    analysis = fake_analysis()
+    slope = np.geomspace(1.0, size, len(analysis.fit.residual))  # noise at one end of the band
+    analysis.fit = replace(analysis.fit, residual=analysis.fit.residual * slope)
+    figure = residuals.draw(analysis)
+    drawn_texts.clear()
+    figure.canvas.draw()
+    assert not covered(drawn_texts)
+
+
+@pytest.mark.parametrize("size", [30.0, 9e2, 3e4])
+def test_numbers_of_tests_far_beyond_have_room(size: float, drawn_texts: list[Any]) -> None:
+    closed = fake_closed("unexplained", "linear")
+    first, *others = closed.traced.before
+    before = (replace(first, statistic=size * first.threshold), *others)
+    figure = loop_tests.draw(replace(closed, traced=replace(closed.traced, before=before)))
+    drawn_texts.clear()
+    figure.canvas.draw()
+    assert not covered(drawn_texts)
+
+
+def test_a_parameter_that_may_be_zero_has_one_unit_in_table_and_figures() -> None:
+    analysis = fake_analysis("free", "phantom")
+    place = analysis.model.names.index("b2")
+    draws = np.array(analysis.stated.draws)
+    ranks = np.argsort(np.argsort(draws[:, place - 1]))  # a pair that is shown
+    draws[:, place] = np.geomspace(1e-9, 1e-3, len(draws))[ranks]  # median 1e-6, 95 % end 5e-4
+    analysis.posterior = replace(analysis.posterior, chains=draws[None, :, None])
+    unit = {row.name: row.unit for row in parameters(analysis)}["b2"]
+    assert unit != scale(1e-6, "Nm s/rad").unit  # as it would be by the median
+    panels = [axes.get_title(loc="left") for axes in marginals.draw(analysis).axes]
+    assert f"b2 [{unit}]" in panels
+    assert f"b2\n[{unit}]" in {axes.get_ylabel() for axes in pairs.draw(analysis).axes}
+
+
+def test_no_correlation_is_less_than_nothing() -> None:
+    analysis = fake_analysis("rigid")
+    draws = np.array(analysis.stated.draws)
+    rng = np.random.default_rng(4)
+    while not -0.004 < pairs.correlation(draws)[0, 1] < 0.0:
+        draws[:, 0] = rng.permutation(draws[:, 0])
+    analysis.posterior = replace(analysis.posterior, chains=draws[None, :, None])
+    axes = pairs.draw(analysis).axes[0]
+    assert axes.texts[0].get_text() == "+0.00"
 
 
 def test_decibels_of_a_limit_over_a_decade_have_room(drawn_texts: list[Any]) -> None:

@@ -15,8 +15,9 @@ from browser import needs_browser, probe
 from fake_analysis import FakeAnalysis, fake_analysis, fake_closed
 
 from bayeshaptic import read_recording, write_report
-from bayeshaptic.diagnosis.residuals.columns import motions
+from bayeshaptic.diagnosis.residuals.columns import SPEED, motions
 from bayeshaptic.diagnosis.residuals.force_curve import force_curve
+from bayeshaptic.diagnosis.residuals.ripples import WAVES
 from bayeshaptic.diagnosis.state import Accepted
 from bayeshaptic.diagnosis.traced import Candidate
 from bayeshaptic.effects.library import effect_class
@@ -287,6 +288,17 @@ def test_tables_hold_what_the_loop_holds() -> None:
     assert errors(closed)[1][1:] == ("1.60", "1.02")
     assert errors(closed)[-1][0] == "critical stiffness, median (90 %)"
     assert all(set(row[1:]) != {"–"} for row in errors(closed))  # what is missing is left out
+
+
+def test_tests_are_named_in_words_with_their_units_and_zero_has_no_sign() -> None:
+    closed = fake_closed(family="linear")
+    some = replace(closed.traced.before[0], statistic=-0.04)
+    tests = tuple(replace(some, name=name) for name in (SPEED, *(wave.test for wave in WAVES)))
+    closed = replace(closed, traced=replace(closed.traced, before=tests, after=()))
+    (speed, _, found, *_), *ripples = outcomes(closed)
+    assert speed == "a command that gives less at speed, like u |v|" and found == "0.0"
+    chance = ", \N{MINUS SIGN}log10 of its chance"
+    assert [row[0] for row in ripples] == [wave.title + chance for wave in WAVES]
 
 
 def test_numbers_beside_the_posterior_stand_in_the_parameter_table() -> None:

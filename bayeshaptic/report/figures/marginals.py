@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.quantities import scale
 from bayeshaptic.report.figures import style
+from bayeshaptic.report.numbers.rows import scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,7 +48,7 @@ def _marginal(axes: Axes, analysis: Analysis, index: int) -> None:
     model, fit = analysis.model, analysis.fit
     name = model.names[index]
     draws = analysis.stated.draws[:, index]
-    row = scale(float(np.median(draws)), model.unit(name))
+    row = scale_of(draws, model.unit(name))
     low, high = _range(draws, float(fit.theta[index]), model.prior(name).support)
     density, edges = np.histogram(draws, BINS, (low, high), density=True)
     density, edges = density / row.factor, edges * row.factor

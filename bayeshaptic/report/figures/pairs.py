@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.quantities import minus, scale
+from bayeshaptic.quantities import minus
 from bayeshaptic.report.figures import style
+from bayeshaptic.report.numbers.rows import scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,9 +55,8 @@ def draw(result: Result) -> Figure:
     figure = style.new_figure(1.2 + 1.12 * size, style.WIDTH_IN if size > 2 else 4.6)
     panels = _triangle(figure, size)
     names = [analysis.model.names[i] for i in chosen]
-    middles = np.median(draws[:, chosen], axis=0)
-    units = [analysis.model.unit(name) for name in names]
-    rows = [scale(float(m), unit) for m, unit in zip(middles, units, strict=True)]
+    every = analysis.stated.draws
+    rows = [scale_of(every[:, i], analysis.model.unit(analysis.model.names[i])) for i in chosen]
     label = [style.named(n, row.unit, "\n") for n, row in zip(names, rows, strict=True)]
     scaled = draws[:, chosen] * [row.factor for row in rows]
     for (i, j), axes in panels.items():
@@ -92,10 +92,7 @@ def draw_on(axes: Axes, result: Result, x: str, y: str) -> None:
     """Two parameters on axes that are there."""
     model, draws = result.analysis.model, result.analysis.stated.draws
     chosen = _some(draws)[:, [model.names.index(n) for n in (x, y)]]
-    rows = [
-        scale(float(middle), model.unit(name))
-        for middle, name in zip(np.median(chosen, axis=0), (x, y), strict=True)
-    ]
+    rows = [scale_of(draws[:, model.names.index(n)], model.unit(n)) for n in (x, y)]
     across, up = (chosen * [row.factor for row in rows]).T
     _pair(axes, across, up, correlation(chosen)[0, 1])
     axes.set_xlabel(style.named(x, rows[0].unit), fontsize=style.FONT)
@@ -118,7 +115,7 @@ def _pair(axes: Axes, x: NDArray[Any], y: NDArray[Any], rank_correlation: float)
     axes.text(
         0.97,
         0.95,
-        minus(f"{rank_correlation:+.2f}"),
+        minus(f"{round(rank_correlation, 2) + 0.0:+.2f}"),
         transform=axes.transAxes,
         ha="right",
         va="top",

@@ -104,5 +104,6 @@ def rms_axis(axes: Axes, lowest: float, highest: float) -> None:
     if highest <= 6:
         axes.set_ylim(0, 1.1 * highest)
         return
-    style.log_scale(axes.yaxis, (1, 2, 5))
+    room = 100  # times, from which on numbers between the powers of ten would overlap
+    style.log_scale(axes.yaxis, (1, 2, 5) if highest < room * lowest else (1,))
     axes.set_ylim(0.9 * lowest, 1.3 * highest)

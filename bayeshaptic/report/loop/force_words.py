@@ -73,14 +73,31 @@ def steps(force: ForceExplained, unit: str) -> Rows:
     )
 
 
+def fits(force: ForceExplained) -> dict[str, InverseDynamics]:
+    """The equations of motion with terms beyond mass and damper, by what they have; none alike."""
+    added = len(force.further.steps) - 1
+    if not added:
+        return {}
+    if added == 1:
+        return {"with the term added": force.further}
+    return {"with the first term": force.first, "with all terms": force.further}
+
+
+def coefficient_heads(force: ForceExplained) -> tuple[str, ...]:
+    """The columns of `coefficients`."""
+    return "", *(fits(force) or ("estimate",))
+
+
 def coefficients(force: ForceExplained) -> Rows:
-    """A row a coefficient: (what it is, with the first term only, with all terms)."""
-    inner = titles(force.first)
+    """A row a coefficient: (what it is, its value in each of `fits`)."""
+    columns = tuple(fits(force).values()) or (force.further,)
     return tuple(
         (
             term.title,
-            _value(force.first, term.name, term.unit) if term.name in inner else _DASH,
-            _value(force.further, term.name, term.unit),
+            *(
+                _value(one, term.name, term.unit) if term.name in titles(one) else _DASH
+                for one in columns
+            ),
         )
         for term in force.further.terms
     )
@@ -94,6 +111,8 @@ def remains(force: ForceExplained, analysis: Analysis) -> str:
         else f"{motion_words(analysis).told} do not rest on these numbers, but on the motion."
     )
     first, further = (pure(100 * f.relative_error, 3) for f in (force.first, force.further))
+    if len(fits(force)) < 2:
+        return f"What is left is {further} % of the force. {limit}"
     return (
         f"What is left is {first} % of the force with the first term and {further} % with all of "
         "them. The terms beyond the first describe this recording and are no law, and with them a "

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from bayeshaptic.diagnosis.residuals.ripples import WAVES
 from bayeshaptic.effects.library import effect_class
 from bayeshaptic.quantities import estimate, minus, percent, quantity, scale
 from bayeshaptic.report.loop.change_words import part
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 _DASH = "\N{EN DASH}"
 _SHOWN = 8
+_CHANCE = ", \N{MINUS SIGN}log10 of its chance"
 # Of tests whose statistic is no number of standard deviations.
 _UNITS = {
     "excess noise": ", dB",
@@ -31,7 +33,8 @@ _UNITS = {
     "dropped_samples": ", count",
     "wild_samples": ", count",
     "outside_force": ", over the usual errors",
-    "mains_tone": ", \N{MINUS SIGN}log10 of its chance",
+    "mains_tone": _CHANCE,
+    **{wave.test: _CHANCE for wave in WAVES},
 }
 
 
@@ -239,7 +242,7 @@ def _score(value: float) -> str:
     """One decimal where the number is small, none where it is large."""
     if not math.isfinite(value):
         return _DASH
-    text = f"{value + 0.0:,.1f}" if abs(value) < 99.95 else f"{value:,.0f}"
+    text = f"{round(value, 1) + 0.0:,.1f}" if abs(value) < 99.95 else f"{value:,.0f}"
     return minus(text)
 
 

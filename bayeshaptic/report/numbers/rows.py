@@ -1,8 +1,14 @@
-"""What tables are made of: text that needs no further formatting."""
+"""What tables are made of: text that needs no further formatting, and the unit of a row."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayeshaptic.quantities import Scale, scale
 
 Rows = tuple[tuple[str, ...], ...]
 _DASH = "\N{EN DASH}"
@@ -27,3 +33,11 @@ class ParameterRow:
     rhat: str
     remarks: str
     shrinkage: str = _DASH
+
+
+def scale_of(draws: NDArray[Any], unit: str) -> Scale:
+    """The unit in which a parameter is written, in tables and figures alike.
+
+    By the upper end of its 90 % interval, too: the median of what may be zero is next to nothing.
+    """
+    return scale((float(value) for value in np.quantile(draws, (0.5, 0.95))), unit)

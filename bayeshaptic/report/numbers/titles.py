@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from bayeshaptic.diagnosis.residuals.columns import SPEED
+from bayeshaptic.diagnosis.residuals.ripples import WAVES
 from bayeshaptic.effects.laws import tested
 from bayeshaptic.effects.library import effects
 
@@ -16,6 +18,8 @@ _TESTS = {
     "smooth change": "a smooth change of the response",
     "a steady change": "a steady change during the recording",
     "a change and back": "a change during the recording, and back",
+    SPEED: "a command that gives less at speed, like u |v|",
+    **{wave.test: wave.title for wave in WAVES},
 }
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from bayeshaptic.quantities import scale
 from bayeshaptic.report.figures import style
-from bayeshaptic.report.loop.force_words import titles
+from bayeshaptic.report.loop.force_words import fits, titles
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,25 +29,26 @@ def draw(closed: Closed) -> Figure:
 
 
 def _residual(axes: Axes, force: ForceExplained, force_unit: str, position_unit: str) -> None:
-    first, further = force.first, force.further
+    first = force.first
     path = first.path
     mass, damping, constant = (first[term.name][0] for term in first.terms[:3])
     linear = mass * path.acceleration + damping * path.velocity + constant
-    row = scale(max(step.held_out_rms for step in further.steps), force_unit)
+    row = scale(max(step.held_out_rms for step in force.further.steps), force_unit)
     most_dots = 3000
     every = max(len(path.velocity) // most_dots, 1)
-    for left, colour, marker, label in (
-        (first.force - linear, style.OTHER, "s", "mass, damper and constant force"),
-        (first.force - first.explained, style.CYCLE[1], "^", "with the first term added"),
-        (further.force - further.explained, style.MODEL, "o", "with all terms"),
-    ):
+    left = {"mass, damper and constant force": first.force - linear}
+    left |= {name: found.force - found.explained for name, found in fits(force).items()}
+    looks = [(style.OTHER, "s"), (style.CYCLE[1], "^"), (style.MODEL, "o")]
+    if len(left) < len(looks):
+        del looks[1]
+    for (name, rest), (colour, marker) in zip(left.items(), looks, strict=False):
         axes.plot(
             path.velocity[::every],
-            row.factor * left[::every],
+            row.factor * rest[::every],
             marker,
             color=colour,
             markersize=1.4,
-            label=label,
+            label=name,
             rasterized=True,
         )
     style.panel(axes, f"velocity, {position_unit}/s", f"force not explained, {row.unit}")

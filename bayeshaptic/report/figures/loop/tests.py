@@ -42,7 +42,8 @@ def draw(closed: Closed) -> Figure:
     axes.plot([], [], "s", color=style.OTHER, markerfacecolor="white", label=_first(closed))
     if after:
         axes.plot([], [], "o", color=style.MODEL, label="after, with what was added")
-    style.log_scale(axes.xaxis, (1, 2, 5))
+    room = 1e4  # times, from which on numbers between the powers of ten would overlap
+    style.log_scale(axes.xaxis, (1, 2, 5) if high < room * least else (1,))
     axes.set_xlim(0.9 * least, high)
     style.rows(axes, [question(test) for test in before])
     style.legend(axes, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.1)
