@@ -292,7 +292,8 @@ def test_a_real_analysis_makes_a_whole_report(tmp_path: Path) -> None:
 
 
 def test_the_page_is_one_light_file_that_needs_nothing_else(tmp_path: Path) -> None:
-    page = written(fake_analysis(notices=(FEEDBACK, FEEDBACK)), tmp_path)
+    other = replace(FEEDBACK, text="The model that was asked for is set aside.")
+    page = written(fake_analysis(notices=(FEEDBACK, FEEDBACK, other)), tmp_path)
     text = page.read_text(encoding="utf-8")
     assert page.stat().st_size < 2_000_000
     assert "<link" not in text and "javascript:" not in text and "@import" not in text
@@ -302,7 +303,9 @@ def test_the_page_is_one_light_file_that_needs_nothing_else(tmp_path: Path) -> N
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     assert f"style-src 'unsafe-inline'; script-src 'sha256-{digest}'" in text
     assert "default-src 'none'; img-src data:;" in text
-    assert text.count(FEEDBACK.text) == 1  # said once, however often it was noticed
+    assert text.count(FEEDBACK.text) == text.count(other.text) == 1  # however often noticed
+    notices = text[text.index('<section id="notices">') :]
+    assert notices[: notices.index("</ul>")].count('class="explained"') == 1  # what a topic means
     for picture in PICTURES:
         assert f'aria-label="Figure: {picture.alternative}"' in html.unescape(text)
 
