@@ -1,6 +1,6 @@
 """Several short recordings of one device as one: how often the intervals hold what the bench was.
 
-    python -m benchmarks.coverage.pooled [COUNT]
+    python -m benchmarks.coverage.pooled [COUNT] [FIRST]
 
 Steps of a rigid device with dry friction under a PD controller, four recordings of 0.5 to 3 s;
 and white noise on free devices in open loop, eight recordings of 1 to 5 s.  In every other series
@@ -92,13 +92,13 @@ def white(seed: int) -> tuple[Recording, dict[str, float]]:
     return join_recordings(found), values | {"delay_s": delay_s}
 
 
-def of_steps(count: int) -> None:
+def of_steps(count: int, first: int) -> None:
     """Coverage of every parameter and of K_CR."""
     from scipy.stats import t as student
 
     reach = student.ppf(0.95, FREEDOM)
     inside, held, widths, white, seconds = [], [], [], 0, 0.0
-    for seed in range(count):
+    for seed in range(first, first + count):
         recording, truth = steps(seed)
         began = time.process_time()
         found = in_white_force(fit_motion(recording), recording)
@@ -114,14 +114,14 @@ def of_steps(count: int) -> None:
         print(f"{name:8s} 90 % interval holds the truth in {100 * share:.0f} %")
     print(f"K_CR     {100 * np.mean(held):.0f} %, median width {np.median(widths):.2g} dB")
     for name, half in (("same", 0), ("differs", 1)):
-        share = 100 * np.mean(np.array(inside)[half::2], axis=0)
+        share = 100 * np.mean(np.array(inside)[(half - first) % 2 :: 2], axis=0)
         print(f"friction {name}: " + ", ".join(f"{s:.0f}" for s in share))
 
 
-def of_white(count: int) -> None:
+def of_white(count: int, first: int) -> None:
     """Coverage of the parameters, joined, and of K_CR; K_CR's width beside one piece's."""
     inside, held, narrower = [], [], []
-    for seed in range(count):
+    for seed in range(first, first + count):
         recording, truth = white(seed)
         widths = []
         for one in (recording, max(recording.pieces, key=lambda piece: piece.samples)):
@@ -149,13 +149,14 @@ def of_white(count: int) -> None:
     )
 
 
-def main(count: int) -> None:
-    """Both kinds."""
-    of_steps(count)
-    of_white(max(count // 2, 1))
+def main(count: int, first: int = 0) -> None:
+    """Both kinds, of the seeds from `first` on."""
+    of_steps(count, first)
+    of_white(max(count // 2, 1), first)
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", nargs="?", type=int, default=60)
-    main(parser.parse_args().count)
+    parser.add_argument("first", nargs="?", type=int, default=0, help="first seed")
+    main(**vars(parser.parse_args()))

@@ -92,22 +92,25 @@ def test_short_steps_under_a_controller_count_together(series: list[Recording]) 
     assert np.all(found.sd[:2] < alone.sd[:2])
 
 
-@pytest.mark.parametrize("spread", [0.0, 0.5])
-def test_friction_that_differs_between_pieces_is_in_the_widths(spread: float) -> None:
+# What is fitted besides may take up much of what is apart, as a force along the way does.
+@pytest.mark.parametrize(("spread", "besides"), [(0.0, 0), (0.5, 0), (0.5, 7)])
+def test_friction_that_differs_between_pieces_is_in_the_widths(spread: float, besides: int) -> None:
     rng = np.random.default_rng(3)
     pieces = [slice(start, start + 50) for start in range(0, 600, 50)]
     estimates, told = [], []
     for _ in range(300):
-        columns = np.zeros((600, 1 + len(pieces)))
+        columns = np.zeros((600, 1 + len(pieces) + besides))
         columns[:, 0] = rng.standard_normal(600)
         for number, piece in enumerate(pieces):
             columns[piece, 1 + number] = 1.0
+            turns = np.pi * (number + 0.5) / len(pieces) * np.arange(1, 1 + besides)
+            columns[piece, 1 + len(pieces) :] = columns[piece, :1] * np.cos(turns)
         friction = 2.0 + spread * np.repeat(rng.standard_normal(len(pieces)), 50)
         target = friction * columns[:, 0] + rng.standard_normal(600)
         inverse = np.linalg.inv(columns.T @ columns)
         solution = inverse @ columns.T @ target
         none = np.zeros(columns.shape[1])
-        found = Ridge(solution, inverse, none, none, 13.0)
+        found = Ridge(solution, inverse, none, none, 13.0 + besides)
         own = [np.array([1 + number]) for number in range(len(pieces))]
         left = target - columns @ solution
         added = between_pieces(columns, left, found, pieces, np.array([0]), own, 600.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,7 +26,8 @@ def between_pieces(
     Each piece has its own coefficients, normal around those of all, with a spread from how far
     apart the pieces are beyond their noise (the moment estimator of R. DerSimonian and N. Laird,
     Controlled Clinical Trials 7, 1986), times (J - 1) / (J - 3): a spread seen in J pieces is not
-    known any better.
+    known any better.  What was fitted to all pieces has taken up some of what is apart, a force
+    along the way before all, where each moves along a way of its own.
 
     Parameters
     ----------
@@ -47,39 +49,64 @@ def between_pieces(
     if count <= fewest:
         return total
     thin = len(residual) / effective
-    parts = [_alone(columns, residual, *one, differ, thin) for one in zip(pieces, own, strict=True)]
-    apart, variance = (np.array(values) for values in zip(*parts, strict=True))
+    alone = [
+        _Alone.of(columns[piece][:, np.append(differ, mine)])
+        for piece, mine in zip(pieces, own, strict=True)
+    ]
+    rests = [residual[piece] for piece in pieces]
+    apart = np.array([one.reads @ rest for one, rest in zip(alone, rests, strict=True)])
+    variance = np.array([one.variances(r, thin) for one, r in zip(alone, rests, strict=True)])
     for number, index in enumerate(differ):
-        spread = _spread(apart[:, number], variance[:, number]) * (count - 1) / (count - fewest)
-        for piece in pieces:
-            moved = found.inverse @ (columns[piece].T @ columns[piece, index])
-            total += spread * np.outer(moved, moved)
+        moved = np.array([found.inverse @ (columns[p].T @ columns[p, index]) for p in pieces])
+        # What a unit in each piece leaves in every other, beside all that was fitted to it.
+        seen = np.empty((count, count))
+        for place, (piece, one) in enumerate(zip(pieces, alone, strict=True)):
+            left = -columns[piece] @ moved.T
+            left[:, place] += columns[piece, index]
+            seen[place] = one.reads[number] @ left
+        spread = _spread(apart[:, number], variance[:, number], seen)
+        total += spread * (count - 1) / (count - fewest) * (moved.T @ moved)
     return total
 
 
-def _alone(
-    columns: Floats, residual: Floats, piece: slice, own: Ints, differ: Ints, thin: float
-) -> tuple[Floats, Floats]:
-    """A piece's own coefficients less those of all, and their variances; shapes (D,), (D,)."""
-    design = columns[piece][:, np.append(differ, own)]
-    scale = lengths(design)
-    scaled = design / scale
-    inverse = np.linalg.pinv(scaled.T @ scaled, hermitian=True)
-    value = inverse @ scaled.T @ residual[piece]
-    left = residual[piece] - scaled @ value
-    known = np.diag(inverse)
-    variance = np.where(known > 0, thin * np.mean(left**2) * known / scale**2, np.inf)
-    kept = slice(0, len(differ))
-    return (value / scale)[kept], variance[kept]
+@dataclass(frozen=True)
+class _Alone:
+    """What reads a piece's own coefficients off what is left of it.
+
+    Attributes
+    ----------
+    design : ndarray, shape (n, K)
+    reads : ndarray, shape (K, n)
+    known : ndarray, shape (K,)
+        Variances of the coefficients over that of a sample.
+    """
+
+    design: Floats
+    reads: Floats
+    known: Floats
+
+    @classmethod
+    def of(cls, design: Floats) -> _Alone:
+        scale = lengths(design)
+        scaled = design / scale
+        inverse = np.linalg.pinv(scaled.T @ scaled, hermitian=True)
+        return cls(design, (inverse @ scaled.T) / scale[:, None], np.diag(inverse) / scale**2)
+
+    def variances(self, rest: Floats, thin: float) -> Floats:
+        """Of the coefficients of a rest, where `thin` samples are worth one."""
+        left = rest - self.design @ (self.reads @ rest)
+        return np.where(self.known > 0, thin * np.mean(left**2) * self.known, np.inf)
 
 
-def _spread(values: Floats, variances: Floats) -> float:
-    """Variance between values beyond their own."""
+def _spread(values: Floats, variances: Floats, seen: Floats) -> float:
+    """Variance between coefficients, of which `seen` (J, J) is in `values`, beyond their own."""
     weight = 1 / variances
     total = float(np.sum(weight))
-    below = total - float(np.sum(weight**2)) / total if total > 0 else 0.0
+    if not total > 0:
+        return 0.0
+    values = values - weight @ values / total
+    below = float(weight @ np.sum((seen - weight @ seen / total) ** 2, axis=1))
     if not below > 1e-6 * total:  # one piece alone says anything
         return 0.0
-    middle = np.sum(weight * values) / total
-    excess = np.sum(weight * (values - middle) ** 2) - (np.count_nonzero(weight) - 1)
-    return float(max(excess / below, 0.0))
+    excess = float(weight @ values**2) - (np.count_nonzero(weight) - 1)
+    return max(excess / below, 0.0)
