@@ -26,9 +26,9 @@ FARED = {
 }
 FARED_HIDDEN = (91, 799)  # the same, two in three with an effect of any size, most of them unseen
 FARED_IN_LOOP = (
-    "Read as a closed loop, through what the controller followed. How such intervals "
-    "fared: of 9 simulated devices that nobody held, 7 of the 90 % intervals held the true limit, "
-    "and 2 missed it by less than 0.01 dB."
+    "Read as a closed loop, through what the controller followed. How such intervals fared: of 45 "
+    "simulated devices that nobody held, 38 of the 90 % intervals held the true limit, and 7 "
+    "missed it by less than 0.03 dB."
 )
 FARED_THROUGHOUT = (
     "Read as a closed loop, through noise in the command that the motion does not make. "
