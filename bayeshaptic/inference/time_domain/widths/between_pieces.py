@@ -54,8 +54,10 @@ def between_pieces(
         for piece, mine in zip(pieces, own, strict=True)
     ]
     rests = [residual[piece] for piece in pieces]
-    apart = np.array([one.reads @ rest for one, rest in zip(alone, rests, strict=True)])
-    variance = np.array([one.variances(r, thin) for one, r in zip(alone, rests, strict=True)])
+    first = slice(0, len(differ))
+    both = tuple(zip(alone, rests, strict=True))
+    apart = np.array([(one.reads @ rest)[first] for one, rest in both])
+    variance = np.array([one.variances(rest, thin)[first] for one, rest in both])
     for number, index in enumerate(differ):
         moved = np.array([found.inverse @ (columns[p].T @ columns[p, index]) for p in pieces])
         # What a unit in each piece leaves in every other, beside all that was fitted to it.
