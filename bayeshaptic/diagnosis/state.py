@@ -262,7 +262,7 @@ def _noise_factor(power: Floats, scatter: Floats, freedom: Floats, nodes: int) -
     def surplus(log_c: float) -> float:  # the likelihood's slope, which falls
         return float(np.sum(freedom * power / (np.exp(log_c) * scatter + power) - nodes))
 
-    if surplus(0.0) <= 0:
+    if not surplus(0.0) > 0:  # nor where a motion ran away, and all of this is nan
         return 1.0
     highest = float(np.log(np.max(freedom * power / scatter)))  # where every term is negative
     return float(np.exp(brentq(surplus, 0.0, max(highest, 1.0))))

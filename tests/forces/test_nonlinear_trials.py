@@ -18,6 +18,7 @@ from bayeshaptic.diagnosis.trials import beside
 from bayeshaptic.diagnosis.trials.beside import beside_tests
 from bayeshaptic.diagnosis.trials.forces import called_for as tried, search, slopes
 from bayeshaptic.diagnosis.trials.forces.along import Along
+from bayeshaptic.diagnosis.trials.forces.fit import fit_force
 from bayeshaptic.diagnosis.trials.forces.form import Form
 from bayeshaptic.diagnosis.trials.forces.search import _damped, _scan
 from bayeshaptic.diagnosis.trials.forces.simulation import Simulation
@@ -525,6 +526,26 @@ def test_a_law_that_takes_all_damping_and_a_motion_that_runs_away_spoil_no_other
     ground = np.isin(state.model.names, ("b1", "b2"))
     damped = _damped(bench, np.where(ground, 0.0, without))
     assert damped == pytest.approx(np.where(ground, 0.2 * without, without))
+
+
+def test_a_fit_ends_where_its_motion_runs_away_when_it_is_asked_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """At the edge of running away it may, or may not: where it does there are no slopes."""
+    state, _ = rubbed(0.5)
+    assert state.etfe.unbroken is not None
+    bench, friction = Tryout(state, state.etfe.unbroken), Acting(CoulombFriction(MOTOR), 0.4)
+    found, asked = bench.point((friction,), state.fit.theta), []
+    simulated = Simulation.added
+
+    def added(self: Simulation, *arguments: Any) -> Floats:
+        asked.append(1)
+        once = simulated(self, *arguments)
+        return once if len(asked) == 1 else np.full_like(once, np.nan)
+
+    monkeypatch.setattr(Simulation, "added", added)
+    best = fit_force(bench, found)
+    assert len(asked) > 1 and best.forces == found.forces and best.gain_fit > 100
 
 
 def test_scores_of_few_lines_count_for_less() -> None:
