@@ -31,6 +31,7 @@ from bayeshaptic.report.numbers.misfit import (
     misfit_is_clear,
     residual_is_noticed,
 )
+from bayeshaptic.report.numbers.result import said_who_holds
 from bayeshaptic.report.numbers.stand_ins import stand_ins
 from bayeshaptic.report.numbers.stiffest import too_stiff
 from bayeshaptic.report.numbers.unstated import unstated
@@ -155,10 +156,11 @@ def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -
             "or in the sensor of force or motion, which the loop does without, nobody can tell"
         )
     if any(notice.topic == HIGH_PASSED for notice in analysis.notices):
+        hand = ", or say --held yes, if somebody held it and nothing was filtered"
         found.append(
             "a device explains the recording better if its position was high-passed before it was "
             "written down, and its limit is lower: record positions as they are read, with "
-            "whatever drift, or say --held yes, if somebody held it and nothing was filtered"
+            f"whatever drift{'' if said_who_holds(analysis) else hand}"
         )
     if (moved := beside_command(analysis)) is not None:
         found.append(moved)

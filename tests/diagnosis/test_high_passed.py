@@ -53,12 +53,18 @@ def test_no_stiffness_follows() -> None:
     assert said.status == "untrusted" and "high-passed" in said.sentence
     steps = next_steps(said, closed)
     assert "as it is read" in steps[0].text and steps[1].command.endswith("--held yes")
+    assert "--held yes" in said.sentence
     truth = Bench.from_device("phantom").true_critical_stiffness()
     assert closed.analysis.limit.quantile(0.05) > 1.3 * truth  # what it is there to prevent
 
 
 def test_a_filter_beside_a_hand_is_seen_too() -> None:
     assert asked(recorded(0.5, 2, held=True), held=True)
+
+
+def test_who_said_that_nobody_holds_it_is_not_told_to_say_so() -> None:
+    said = headline(close_loop(recorded(0.8), held=False, hidden=False))
+    assert "high-passed" in said.sentence and "--held" not in said.sentence
 
 
 @pytest.mark.parametrize("held", [False, True])

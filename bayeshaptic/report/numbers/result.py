@@ -29,6 +29,12 @@ def may_be_held(analysis: Analysis) -> bool:
     return analysis.model.held or any(one.held for one in tried.values())
 
 
+def said_who_holds(analysis: Analysis) -> bool:
+    """Whether somebody said who holds the device, or that nobody does."""
+    tried = {} if analysis.choice is None else analysis.choice.candidates
+    return len({one.held for one in tried.values()}) < 2
+
+
 def hides_hand(analysis: Analysis) -> bool:
     """Whether the device is read through a reference that a hand, if there is one, hides behind.
 

@@ -16,7 +16,7 @@ from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.report.beyond_band import beyond_band
-from bayeshaptic.report.numbers.result import is_unexplained, may_be_held
+from bayeshaptic.report.numbers.result import is_unexplained, may_be_held, said_who_holds
 from bayeshaptic.report.numbers.stiffest import too_stiff
 from bayeshaptic.report.objections import changes, is_open, is_the_rest
 
@@ -131,9 +131,7 @@ def _after_uneven_rows(result: Result, command: str, new: str) -> tuple[Step, ..
 def _after_filter(result: Result, command: str, new: str) -> tuple[Step, ...]:
     """Where the position may have been high-passed before it was written down."""
     unfiltered = Step("Record the position as it is read, and leave its drift in it. Then:", new)
-    choice = result.analysis.choice
-    tried = {} if choice is None else choice.candidates
-    if len({one.held for one in tried.values()}) < 2:  # somebody said who held it
+    if said_who_holds(result.analysis):
         return (unfiltered,)
     held = Step(
         "Or say so, if somebody held the device and nothing was filtered. This recording will do:",
