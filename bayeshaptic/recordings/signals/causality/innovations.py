@@ -49,9 +49,9 @@ def innovations_answer(of_force: Prediction, of_position: Prediction) -> float:
     inside[inside] = rows[at[inside]] - rows[at[inside] - _LAST] == _LAST
     force, at = force[inside], at[inside]
     summed = np.concatenate([[0.0], np.cumsum(position)])
-    found = [_z(force * (summed[at - low + 1] - summed[at - high + 1])) for low, high in _SPANS]
+    spans = np.array([summed[at - low + 1] - summed[at - high + 1] for low, high in _SPANS])
     against = min(_z(force * position[at]), 0.0)
-    return float(np.sum(np.square([*found, against])))
+    return _chi_square(force * spans) + against**2
 
 
 def _power(signal: Floats) -> float:
@@ -65,6 +65,20 @@ def _is_white(signal: Floats) -> bool:
     own = [centred[lag:] @ centred[:-lag] / power for lag in range(1, _LAST)]
     foretold = 5e-3
     return float(np.sum(np.square(own))) < 2 * _LAST / len(signal) + foretold
+
+
+def _chi_square(products: Floats) -> float:
+    """Of the sums of several products, each of mean zero and new in every sample.
+
+    Their covariance counts: where the position's innovations foretell each other (a coarse encoder,
+    rows that are not there, a force that is not linear), the spans see one chance several times.
+    """
+    total = products.sum(axis=1)
+    size = np.sqrt(np.sum(products**2, axis=1)) + np.finfo(float).tiny
+    z, scaled = total / size, products / size[:, None]
+    # Directions that hardly any of the products has are none.
+    faintest = 1e-6
+    return float(z @ np.linalg.pinv(scaled @ scaled.T, rcond=faintest, hermitian=True) @ z)
 
 
 def _z(products: Floats) -> float:
