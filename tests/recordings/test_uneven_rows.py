@@ -56,6 +56,11 @@ def test_motion_that_repeats_has_lines_of_its_own(period: int) -> None:
     assert uneven_rows(force, moved, 1e-3, True) is None
 
 
+def test_a_position_that_never_changes_says_nothing_of_its_rows() -> None:
+    force = np.random.default_rng(5).standard_normal(ROWS)
+    assert uneven_rows(force, np.zeros(ROWS), 1e-3, True) is None
+
+
 def test_a_page_asks_for_every_row_and_gives_no_other_reason() -> None:
     made = simulate(Bench.from_device("phantom"), WhiteNoise(0.05, 200.0, 0.7, 6.0), seed=4)
     newest = np.floor(1.3 * np.arange(int(len(made.force) / 1.3))).astype(int)

@@ -62,7 +62,7 @@ def uneven_rows(force: Floats, position: Floats, period_s: float, stamped: bool)
     stamped : bool
         Whether time stamps say so: then ``--period-s`` can say that the loop has it, too.
     """
-    if len(force) < _FEWEST_SAMPLES:
+    if len(force) < _FEWEST_SAMPLES or np.ptp(position) == 0:
         return None
     found = _pattern(position, force)
     if found is None or found.height < _HIGHER * found.moved or found.width < _WIDE:
