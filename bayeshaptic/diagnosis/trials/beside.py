@@ -45,8 +45,9 @@ def beside_tests(state: State) -> tuple[Test, ...]:
     looked_for = [
         effect
         for kind in effects("nonlinear")
-        if kind.tests and not issubclass(kind, CommandEffect) and not is_there(kind, state)
+        if kind.tests and not issubclass(kind, CommandEffect)
         for effect in kind.candidates(state.model, motion)
+        if not is_there(effect, state)
     ]
     tests: dict[str, Test] = {}
     for hint in hints(tryout, looked_for):

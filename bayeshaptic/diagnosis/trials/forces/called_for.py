@@ -16,9 +16,8 @@ def called_for(
     firsts: dict[str, Variants] = {}  # by the name of the strength: laws of friction share one
     others: list[Variants] = []
     for kind in effects("nonlinear"):
-        if is_there(kind, state):
-            continue
-        called = [e for e in kind.candidates(state.model, motion) if e.called_for(over)]
+        near = [e for e in kind.candidates(state.model, motion) if not is_there(e, state)]
+        called = [e for e in near if e.called_for(over)]
         if called and kind.strength[0] in firsts:
             others.append(called)
         elif called:
@@ -26,14 +25,18 @@ def called_for(
     return list(firsts.values()), others
 
 
-def is_there(kind: type[NonlinearEffect], state: State) -> bool:
-    """Whether the state has the effect, or another law of the same thing.
+def is_there(effect: NonlinearEffect, state: State) -> bool:
+    """Whether the state has the effect where it acts, or another law of the same thing.
 
-    One mass has one friction, and one actuator one characteristic: a second law on top of the
-    first would only mend it.
+    A mass has one friction, and an actuator one characteristic: a second law on top of the first
+    would only mend it.  Another mass may rub as well.
     """
-    if any(kind.strength[0] in accepted.estimates for accepted in state.accepted):
-        return True
-    names = {accepted.name for accepted in state.accepted}
-    actuators = {k.name for k in effects("nonlinear") if issubclass(k, CommandEffect)}
-    return kind.name in (names | actuators if names & actuators else names)
+    actuators = {kind.name for kind in effects("nonlinear") if issubclass(kind, CommandEffect)}
+    for accepted in state.accepted:
+        acting = None if accepted.change is None else accepted.change.acting
+        if isinstance(effect, CommandEffect) and accepted.name in actuators:
+            return True
+        alike = effect.name == accepted.name or effect.strength[0] in accepted.estimates
+        if alike and (acting is None or acting.effect.place == effect.place):
+            return True
+    return False
