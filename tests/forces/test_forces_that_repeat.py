@@ -12,7 +12,10 @@ from bayeshaptic.diagnosis.hidden.forces import force_suspects
 from bayeshaptic.diagnosis.periodic.force_tests import force_tests
 from bayeshaptic.diagnosis.periodic.lines import LineTrials
 from bayeshaptic.diagnosis.residuals.residual import Test as ResidualTest
+from bayeshaptic.diagnosis.trials.beside import beside_tests
+from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
 from bayeshaptic.models import build_model
+from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.rig import Bench, Multisine, simulate
 
 FORCE_RMS_N = 0.02
@@ -61,3 +64,10 @@ def test_what_is_not_seen_may_hide() -> None:
     places = {one.place: one for one in force_suspects(kind.first.model, every, (), FORCE_RMS_N)}
     said = places["sign(v)"].tested
     assert said is not None and 0 < said.sd < 0.01 * FORCE_RMS_N
+
+
+def test_windows_try_no_force_where_what_is_left_repeats() -> None:
+    """As that of a sweep may with a ripple taken off, which did not before."""
+    state = looked_at(False, 0.1, 3)[0].first
+    assert nonlinear_trials(state, {"sign(v)"}, Meter()) == []
+    assert beside_tests(state) == ()

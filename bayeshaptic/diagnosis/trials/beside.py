@@ -11,6 +11,7 @@ benchmarks/strangers without one, eight of which stay unexplained, none is given
 from __future__ import annotations
 
 from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.battery import is_periodic
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.diagnosis.trials.forces.called_for import is_there
@@ -38,7 +39,7 @@ def beside_tests(state: State) -> tuple[Test, ...]:
     Of the laws that tests look for, at all their places; not of what is there already.
     """
     recording = state.etfe.unbroken
-    if recording is None or state.etfe.through_reference:
+    if recording is None or state.etfe.through_reference or is_periodic(state.etfe):
         return ()
     tryout = Tryout(state, recording)
     motion = tryout.simulation.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from bayeshaptic.diagnosis import thresholds
+from bayeshaptic.diagnosis.battery import is_periodic
 from bayeshaptic.diagnosis.state import State, Trial
 from bayeshaptic.diagnosis.trials.forces.called_for import called_for
 from bayeshaptic.diagnosis.trials.forces.search import (
@@ -45,8 +46,8 @@ def nonlinear_trials(
         Says whether one more search for a force, or one more fit of one, is affordable.
     """
     recording = state.etfe.unbroken
-    if recording is None:
-        return []
+    if recording is None or is_periodic(state.etfe):
+        return []  # of what repeats, as a mended recording may, the lines have trials of their own
     tryout = Tryout(state, recording)
     motion = tryout.simulation.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
     firsts, others = called_for(state, variables(raised), motion)
