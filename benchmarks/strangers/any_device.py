@@ -82,7 +82,8 @@ def device_of(draw: Draw, mass: float, period_s: float) -> dict[str, Any]:
         return values | {"m": np.array([mass]), "b1": damping}
     values |= {"bc": 2 * between(0.002, 0.2) * moving * mode, "kc": moving * mode**2, "m": masses}
     if draw.held:
-        hand = mass * between(0.1, 3)
+        # In kilograms a hand is a hand, however small the device; about an axis it goes with that.
+        hand = between(0.01, 1.0) if draw.like == "lhifam" else mass * between(0.1, 3)
         grip, arm = turn * between(6, 40), turn * between(1, 5)
         values |= {"m": np.append(masses, hand), "ks": hand * grip**2, "kh": hand * arm**2}
         values |= {"bs": 2 * between(0.03, 0.6) * hand * grip}

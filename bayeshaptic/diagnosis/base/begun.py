@@ -127,7 +127,7 @@ def simpler(begun: Begun, fit: Fit, options: Options) -> Iterator[Fit]:
         for name in _UNHELD:
             model = _built(name, begun.etfe, begun.device, options)
             if model.size < begun.fit.model.size:
-                yield least_squares(model, begun.etfe, options.seed)
+                yield least_squares(model, begun.etfe, options.seed, most_sets=1)
     if fit.model.effects:
         yield begun.fit
 
