@@ -1,12 +1,13 @@
 """Recordings made in closed loop: how often the intervals hold what the bench was.
 
-    python -m benchmarks.closed_loop [COUNT] [--white SHARE] [--first SEED]
+    python -m benchmarks.closed_loop [COUNT] [--white SHARE] [--first SEED] [--exact SECONDS]
 
 Rigid devices of 0.1 to 10 kg under five controllers and four kinds of references, 2 to 30 s.  In
 seven of ten there is a force that depends on the position, and friction that changes along the way,
 differs between the directions, and fades near standstill: none of these is a law of the model.
 The same once more without such a force, and with one of white noise in its place: widths beside the
-least that are possible.  With --white that alone, of this share of the command.
+least that are possible.  With --white that alone, of this share of the command; with --exact, too,
+beside what the counts themselves say of recordings up to so long, at some 4 s of CPU time for each.
 """
 
 from __future__ import annotations
@@ -27,10 +28,12 @@ from bayeshaptic.models import rigid
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats
 from benchmarks.one_mass_bound import bound, spreads, with_limit
+from benchmarks.one_mass_exact import of_counts
 from benchmarks.recordings.one_mass import PERIOD_S, make
 
 DRAWS = 600
 FIRST = 1000  # seed of the loops under a white force
+LOST = 1e-2  # of what is known of a mass, beyond its grid: more is no information
 
 
 def limit_draws(truth: Floats, values: Floats, covariance: Floats, seed: int) -> Floats:
@@ -86,9 +89,12 @@ def main(count: int) -> None:
         )
 
 
-def beside_the_bound(count: int, noise: float, along_too: bool = False, first: int = FIRST) -> None:
+def beside_the_bound(
+    count: int, noise: float, along_too: bool = False, first: int = FIRST, exact_s: float = 0.0
+) -> None:
     """Print how wide posteriors are, and errors, beside the Cramer-Rao bound."""
     widths, errors, inside, white = [], [], [], []
+    exact: list[tuple[Floats, Floats]] = []
     reach = student.ppf(0.95, FREEDOM)
     for seed in range(first, first + count):
         case = make(seed, noise, along_too)
@@ -104,6 +110,11 @@ def beside_the_bound(count: int, noise: float, along_too: bool = False, first: i
         errors.append(off / least)
         inside.append(off < reach * sd)
         white.append(found.disturbed is not None)
+        if case.recording.duration_s < exact_s:
+            covariance, lost = of_counts(case)
+            if lost < LOST:
+                own = np.where(least > 0, spreads(covariance, slopes), np.nan)
+                exact.append((own / least, sd / own))
     known = np.array(white)
     beside = ", and one along the way in seven of ten" if along_too else ""
     print(f"a white force of {100 * noise:g} % of the command{beside}, {len(widths)} recordings:")
@@ -113,6 +124,10 @@ def beside_the_bound(count: int, noise: float, along_too: bool = False, first: i
         print(f"{what} ({np.count_nonzero(some)}), medians of sd and |error| over the bound, held:")
         for name, width, error, share in zip((*NAMES, "ln K_CR"), *middles, held, strict=True):
             print(f"{name:8s} {width:.3g}  {error:.3g}  {100 * share:.0f} %")
+    if exact:
+        print(f"medians of {len(exact)}: what the counts allow over the bound, and sd over that")
+        for name, *ratios in zip((*NAMES, "ln K_CR"), *np.nanmedian(exact, axis=0), strict=True):
+            print(f"{name:8s} " + "  ".join(f"{ratio:.3g}" for ratio in ratios))
 
 
 if __name__ == "__main__":
@@ -120,9 +135,10 @@ if __name__ == "__main__":
     parser.add_argument("count", nargs="?", type=int, default=200)
     parser.add_argument("--white", type=float, metavar="SHARE", help="of the command's size")
     parser.add_argument("--first", type=int, default=FIRST, metavar="SEED")
+    parser.add_argument("--exact", type=float, default=0.0, metavar="SECONDS")
     asked = parser.parse_args()
     if asked.white is not None:
-        beside_the_bound(asked.count, asked.white, first=asked.first)
+        beside_the_bound(asked.count, asked.white, first=asked.first, exact_s=asked.exact)
     else:
         main(asked.count)
         for share in (0.003, 0.01, 0.03):

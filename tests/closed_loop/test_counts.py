@@ -15,6 +15,8 @@ from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.recordings import join_recordings, recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Floats
+from benchmarks.one_mass_exact import likely
+from benchmarks.recordings.one_mass import Case
 
 PERIOD_S = 1e-3
 TRUTH = np.array([1.5, 9.0, 0.5, 0.3, 1.4e-3])  # mass, damping, friction, constant force, delay
@@ -148,6 +150,32 @@ def test_probabilities_of_a_mass_that_crawls_are_those_of_many() -> None:
     # With one normal for all that move one way the sum is five lower, and this is 0.12.
     assert abs(np.sum(apart)) < 4 * by_chance + 0.005 * len(apart)
     assert np.sqrt(np.mean(apart**2)) < 0.08
+
+
+def test_likelihoods_fall_as_on_a_grid() -> None:
+    count = 2e-6
+    recording = looped(1.0, seed=4, count=count)
+    case = Case(recording, TRUTH, "", count, FORCE_SD)
+    counts = counts_of(recording, unit=count)
+    point = np.append(TRUTH, np.log(FORCE_SD))
+
+    def both(at: Floats) -> Floats:
+        mixed = counts.after(at[:5], float(np.exp(at[5]))).likely
+        on_grid, lost = likely(case, at)
+        assert lost < 1e-3
+        return np.array([np.sum(one[60:]) for one in (mixed, on_grid)])  # begun otherwise
+
+    middle = both(point)
+    assert middle[0] == pytest.approx(middle[1], abs=1)
+    for value, step in ((1, 0.1), (2, 0.015), (3, 0.015)):  # damping, friction, constant force
+        off = np.zeros(len(point))
+        off[value] = step
+        low, high = both(point - off) - middle, both(point + off) - middle
+        mixed, on_grid = low + high
+        assert on_grid < -2
+        assert mixed == pytest.approx(on_grid, rel=0.05)
+        mixed, on_grid = high - low
+        assert mixed == pytest.approx(on_grid, abs=0.2)
 
 
 def test_it_does_not_matter_how_a_delay_is_split() -> None:
