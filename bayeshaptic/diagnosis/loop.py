@@ -106,6 +106,7 @@ class Loop:
         self._path: list[State] = []
         self._before: tuple[Test, ...] = ()
         self._tests: tuple[Test, ...] = ()  # of what is left
+        self._before_forces: tuple[Test, ...] = ()
         self._candidates: list[Candidate] = []
         self._rejected: tuple[Trial, ...] = ()
         self._number = 0
@@ -162,6 +163,7 @@ class Loop:
             self._rejected,
             tuple(self._path),
             tuple(self.meter.skipped),
+            self._before_forces,
         )
 
     @cached_property
@@ -259,6 +261,8 @@ class Loop:
         if acceptance.force_acts(state.accepted) and not any(test.flagged for test in tests):
             beside = self._kind.beside(state)
             tests = (*tests, *acceptance.remaining(beside, state.accepted))
+        if acceptance.force_acts(state.accepted) and not acceptance.force_acts(self.state.accepted):
+            self._before_forces = self._tests
         self._path.append(state)
         self.state, self._tests = state, tests
 

@@ -11,6 +11,7 @@ import numpy as np
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import Accepted, State, Trial
 from bayeshaptic.errors import Notice
+from bayeshaptic.inference.fit import Fit
 
 CONSISTENT, EXPLAINED, UNEXPLAINED = "consistent", "explained", "unexplained"
 
@@ -61,6 +62,9 @@ class Traced:
         From the base model on, one for each time that something was accepted.
     skipped : tuple of str
         What was not tried because the budget was spent.
+    before_forces : tuple of Test
+        The tests of the residual before the first force was taken off: what a low-pass hid shows
+        beside that low-pass.
     """
 
     verdict: str
@@ -72,6 +76,16 @@ class Traced:
     rejected: tuple[Trial, ...] = ()
     path: tuple[State, ...] = ()
     skipped: tuple[str, ...] = ()
+    before_forces: tuple[Test, ...] = ()
+
+    @property
+    def without_forces(self) -> Fit | None:
+        """The last fit on the way from which no force was taken off; None where none is known.
+
+        What a force moved is told beside it: what linear effects moved before is theirs.
+        """
+        bare = (one for one in reversed(self.path) if not _has_force(one))
+        return next((one.fit for one in bare), None)
 
     def table(self, posterior: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
         """In the form of ``summary.json``.
@@ -118,6 +132,10 @@ class Traced:
         return tuple(found)
 
 
+def _has_force(state: State) -> bool:
+    return any(effect.family == "nonlinear" for effect in state.accepted)
+
+
 def _effect(effect: Accepted, posterior: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     keys = ("mean", "sd", "q05", "q50", "q95", "unit")
     parameters = {name: {k: posterior[name][k] for k in keys} for name in effect.parameters}
@@ -146,6 +164,6 @@ def share_left(traced: Traced, family: str) -> float:
     """What tests of a class still see after an effect of it was taken off, over what they saw."""
     before, after = (
         max((test.statistic for test in tests if test.family == family), default=0.0)
-        for tests in (traced.before, traced.after)
+        for tests in ((*traced.before, *traced.before_forces), traced.after)
     )
     return float(np.clip(after / before, 0.0, 1.0)) if before > 0 else 1.0

@@ -35,6 +35,7 @@ from bayeshaptic.report.numbers.result import said_who_holds
 from bayeshaptic.report.numbers.stand_ins import stand_ins
 from bayeshaptic.report.numbers.stiffest import too_stiff
 from bayeshaptic.report.numbers.unstated import unstated
+from bayeshaptic.stability.critical import critical_stiffness
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -296,5 +297,9 @@ def is_the_rest(closed: Closed) -> bool:
     """Whether the limit is a small difference of two large ones, with a force and without it."""
     if not any(effect.family == "nonlinear" for effect in closed.effects):
         return False
-    before, after = (one.limit.quantile(0.5) for one in (closed.base, closed.analysis))
+    bare, after = closed.traced.without_forces, closed.analysis.limit.quantile(0.5)
+    if bare is None or bare.model is closed.base.fit.model:
+        before = float(closed.base.limit.quantile(0.5))
+    else:  # what linear effects that were found first did to the limit is theirs
+        before = critical_stiffness(bare.model, bare.theta).value
     return bool(math.isfinite(before) and before > _MOSTLY * after)

@@ -17,6 +17,7 @@ from bayeshaptic.diagnosis.widening.friction import (
 )
 from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.report import objections
 from bayeshaptic.report.objections import _rubs_otherwise, is_the_rest
 
 
@@ -90,11 +91,21 @@ def test_damping_may_be_the_friction_that_would_make_the_noise(
 
 
 @pytest.mark.parametrize(
-    ("family", "before", "objects"),
-    [("nonlinear", 11.0, True), ("nonlinear", 9.0, False), ("linear", 11.0, False)],
+    ("family", "before", "bare", "objects"),
+    [
+        ("nonlinear", 11.0, None, True),
+        ("nonlinear", 9.0, None, False),
+        ("linear", 11.0, None, False),
+        ("nonlinear", 11.0, 9.0, False),  # a low-pass that was found first moved it most
+        ("nonlinear", 9.0, 11.0, True),
+    ],
 )
 def test_a_limit_is_no_small_difference_of_two_large_ones(
-    family: str, before: float, objects: bool
+    monkeypatch: pytest.MonkeyPatch,
+    family: str,
+    before: float,
+    bare: float | None,
+    objects: bool,
 ) -> None:
     """Of five recordings of a rubbing motor three had 1.8 to 4.4 times the limit in green."""
 
@@ -102,5 +113,16 @@ def test_a_limit_is_no_small_difference_of_two_large_ones(
         return SimpleNamespace(limit=SimpleNamespace(quantile=lambda share: to))
 
     effects = (SimpleNamespace(family=family),)
-    what: Any = SimpleNamespace(effects=effects, base=limited(before), analysis=limited(1.0))
+    base = limited(before)
+    base.fit = SimpleNamespace(model="as declared")
+    fit = None if bare is None else SimpleNamespace(model="with a low-pass", theta=np.ones(3))
+    what: Any = SimpleNamespace(
+        effects=effects,
+        base=base,
+        analysis=limited(1.0),
+        traced=SimpleNamespace(without_forces=fit),
+    )
+    monkeypatch.setattr(
+        objections, "critical_stiffness", lambda model, theta: SimpleNamespace(value=bare)
+    )
     assert is_the_rest(what) == objects

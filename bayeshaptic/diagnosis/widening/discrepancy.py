@@ -156,6 +156,8 @@ def _rest(base: Fit, traced: Traced, family: str) -> float:
     fit = traced.state.fit
     if family == "nonlinear" and traced.state.etfe.direct:
         return min(forces_left(fit, traced.after).limit_log, _FARTHEST)
+    if family == "nonlinear":
+        base = traced.without_forces or base
     limits = [critical_stiffness(one.model, one.theta).value for one in (base, fit)]
     moved = abs(float(np.log(max(limits[0], 1e-9) / max(limits[1], 1e-9))))
     return share_left(traced, family) * min(moved, _FARTHEST)

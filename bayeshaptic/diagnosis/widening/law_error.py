@@ -29,7 +29,7 @@ def with_law_error(
     posterior : Posterior
         Given the fitted forces.
     base : Fit
-        Of the model as declared.
+        Of the model as declared: where nothing is known of the way to the accepted effects.
     traced : Traced
         With the fit of the model with what was found.
     seed : int
@@ -41,7 +41,8 @@ def with_law_error(
     shape = posterior.chains.shape[:-1]
     sd = np.sqrt(sum(_relative_sd(law) ** 2 for law in laws))
     strength, rest = sd * rng.standard_normal(shape), rng.uniform(-1.0, 1.0, shape)
-    known = dict(zip(base.model.names, base.theta, strict=True))
+    bare = traced.without_forces or base
+    known = dict(zip(bare.model.names, bare.theta, strict=True))
     moved = np.array(
         [
             value - known.get(name, value)
