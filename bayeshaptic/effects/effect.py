@@ -68,6 +68,23 @@ class LinearEffect(ABC):
         """What it may be on `model` where nobody has seen it; None where that is not asked."""
         return None
 
+    def on_the_other_side(
+        self, model: Model, etfe: Etfe, own: Floats
+    ) -> tuple[LinearEffect, Floats] | None:
+        """The effect that does the same to the response on the other side of the masses.
+
+        With its values; None where there is none.  Forces that act on the masses tell them apart.
+
+        Parameters
+        ----------
+        model : Model
+            Without this effect.
+        etfe : Etfe
+        own : ndarray
+            Values of this effect's parameters.
+        """
+        return None
+
     def own(self, values: Mapping[str, Floats]) -> tuple[Floats, ...]:
         """The values of this effect's parameters, in their order, shape (B,) each."""
         return tuple(values[parameter.name] for parameter in self.parameters)

@@ -17,7 +17,7 @@ from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.lines import Lines
 from bayeshaptic.diagnosis.residuals.moved import coasting, slow_velocity
 from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test
-from bayeshaptic.diagnosis.residuals.unforced import commanded_motions
+from bayeshaptic.diagnosis.residuals.unforced import commanded_motions, commanded_position
 from bayeshaptic.effects.laws import tested
 from bayeshaptic.effects.nonlinear.shapes import (
     ALONG,
@@ -28,6 +28,7 @@ from bayeshaptic.effects.nonlinear.shapes import (
     VELOCITY,
 )
 from bayeshaptic.inference.fit import Fit
+from bayeshaptic.models.response.filters import share
 from bayeshaptic.numerics.polynomials.polynomial import Polynomial, evaluate
 from bayeshaptic.quantities import percent
 from bayeshaptic.recordings.recording import Recording
@@ -94,7 +95,7 @@ def speed_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     if recording is None or etfe.period_lines is not None:
         return ()
     at_lines = Lines.of(etfe, recording)
-    speed = np.abs(driven_motion(fit, recording)[1])
+    speed = np.abs(driven_velocity(fit, recording))
     force = recording.force - recording.force.mean()
     usual = float(np.sqrt(np.mean(speed**2)))
     added = response_to(fit, COMMAND, at_lines.s) * at_lines(force * speed / usual)
@@ -199,7 +200,7 @@ def motions(fit: Fit, recording: Recording) -> dict[str, Floats]:
 
     The motion is that of the model: signs taken from an encoder are those of its noise.
     """
-    _, velocity = driven_motion(fit, recording)
+    velocity = driven_velocity(fit, recording)
     position = recording.position - recording.position.mean()
     found = {VELOCITY: velocity, POSITION: position, ALONG: position}
     if len(fit.model.system(fit.theta).mechanism.masses) > 1:
@@ -211,43 +212,47 @@ def motions(fit: Fit, recording: Recording) -> dict[str, Floats]:
 
 
 def response_to(fit: Fit, over: str, s: Complexes) -> Complexes:
-    """Position of the motor over a force that is a function of `over`, at points s."""
+    """Position that is read over a force that is a function of `over`, at points s.
+
+    What filters the position filters what forces do, and an actuator's lag does not.
+    """
     if over == STRETCH:
         return pair_response(fit, s)
     if over == COMMAND:
         return np.asarray(fit.response(s.imag / (2 * np.pi)))
     if over == LOAD_VELOCITY:
         return load_response(fit, s)
-    return fit.model.system(fit.theta).continuous_response(s)[0]
+    return fit.model.system(fit.theta).of_forces.continuous_response(s)[0]
 
 
-def driven_motion(fit: Fit, recording: Recording) -> tuple[Floats, Floats]:
-    """Position and velocity of the motor without encoder noise.
+def driven_velocity(fit: Fit, recording: Recording) -> Floats:
+    """Velocity of the motor without encoder noise.
 
     What the command does comes from the model; what a hand does besides is taken from the
     measured position below 20 Hz, where the encoder sees it well, and of a free device how it began
     and what a constant force does: friction has a sign where it slides along with that.  In closed
     loop the command answers to whatever moves the device besides, as to a hand.
     """
-    ((x, v),) = commanded_motions(fit, recording)
+    x, v = commanded_position(fit, recording), commanded_motions(fit, recording)[0, 1]
     if fit.model.held or recording.reference is not None:
         rest = recording.position - recording.position.mean() - x
-        v = v + slow_velocity(rest, recording.period_s)
-    else:
-        system = fit.model.system(fit.theta)
-        v = v + coasting(system, recording.position - x, recording.period_s)[1]
-    return x, v
+        return np.asarray(v + slow_velocity(rest, recording.period_s))
+    system = fit.model.system(fit.theta)
+    return np.asarray(v + coasting(system, recording.position - x, recording.period_s)[1])
 
 
 def load_response(fit: Fit, s: Complexes) -> Complexes:
-    """Position of the motor over a force at the load, at points s."""
-    return _ratio(*fit.model.system(fit.theta).mechanism.transfer_to(1), s)
+    """Position that is read over a force at the load, at points s."""
+    system = fit.model.system(fit.theta)
+    return _ratio(*system.mechanism.transfer_to(1), s) * share(system.sensing, s)
 
 
 def pair_response(fit: Fit, s: Complexes) -> Complexes:
-    """Position of the motor over a pair of forces in the connection, +1 on m1 and -1 on m2."""
-    mechanism = fit.model.system(fit.theta).mechanism
-    return _ratio(mechanism.mutual(mechanism.drive, (0, 1)), mechanism.transfer()[1], s)
+    """Position that is read over a pair of forces in the connection, +1 on m1 and -1 on m2."""
+    system = fit.model.system(fit.theta)
+    mechanism = system.mechanism
+    own = _ratio(mechanism.mutual(mechanism.drive, (0, 1)), mechanism.transfer()[1], s)
+    return own * share(system.sensing, s)
 
 
 def _ratio(numerator: Polynomial, denominator: Polynomial, s: Complexes) -> Complexes:

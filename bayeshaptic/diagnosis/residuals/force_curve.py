@@ -64,6 +64,8 @@ def force_curve(
     low, high = np.quantile(motion, _EDGES)
     knots = _KNOTS * motion.std()
     knots = knots[(knots > low) & (knots < high)]
+    if not len(knots):  # of a motion that hardly turns round
+        knots = np.array([low, high])
     hats = [np.interp(motion, knots, row) for row in np.eye(len(knots))]
     at_lines = Lines.of(etfe, etfe.recording)
     response = response_to(fit, over, at_lines.s)

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayeshaptic.diagnosis.residuals.unforced import coasting_motions, commanded_motions, parts
+from bayeshaptic.diagnosis.residuals.unforced import (
+    coasting_motions,
+    commanded_motions,
+    commanded_position,
+    parts,
+)
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models import LinearSystem
 from bayeshaptic.numerics.low_pass import low_pass, slow_share
@@ -52,7 +57,7 @@ def left_of_position(fit: Fit, recording: Recording) -> float:
     fit : Fit
     recording : Recording
     """
-    besides = recording.position - commanded_motions(fit, recording)[0, 0]
+    besides = recording.position - commanded_position(fit, recording)
     coasted, _ = coasting(fit.model.system(fit.theta), besides, recording.period_s)
     return float(np.std(besides - coasted) / np.std(recording.position))
 
@@ -69,8 +74,8 @@ def moved_besides(fit: Fit, recording: Recording) -> float:
     fit : Fit
     recording : Recording
     """
-    period_s, ((x, v),) = recording.period_s, commanded_motions(fit, recording)
-    besides = recording.position - x
+    period_s, v = recording.period_s, commanded_motions(fit, recording)[0, 1]
+    besides = recording.position - commanded_position(fit, recording)
     coasted, along = coasting(fit.model.system(fit.theta), besides, period_s)
     left = besides - coasted
     if recording.sensed is not None and recording.sensed.derivatives:

@@ -14,18 +14,32 @@ import numpy as np
 
 from bayeshaptic.diagnosis.residuals.columns import force_test, nonlinear_tests
 from bayeshaptic.diagnosis.residuals.residual import ForceSeen, Test
-from bayeshaptic.inference.fit import Fit
+from bayeshaptic.effects.other_side import on_the_other_side
+from bayeshaptic.inference.fit import Fit, summarise
 from bayeshaptic.recordings.response.etfe import Etfe
 
 
 def force_in_pieces(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
     """The tests of `nonlinear_tests`, of a recording in one piece or in several.
 
+    Beside a low-pass, on whichever side of the masses a force stands out further: which it is on
+    the response does not tell.
+
     Parameters
     ----------
     fit : Fit
     etfe : Etfe
     """
+    other = on_the_other_side(fit.model, etfe, fit.theta)
+    if other is None:
+        return _on_one_side(fit, etfe)
+    turned = summarise(other.model, fit.windows, other.theta)
+    sides = zip(_on_one_side(fit, etfe), _on_one_side(turned, etfe), strict=True)
+    return tuple(max(both, key=lambda test: test.statistic) for both in sides)
+
+
+def _on_one_side(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
+    """With a low-pass on the side of the masses where the fit has it."""
     if not etfe.parts:
         return nonlinear_tests(fit, etfe)
     found: dict[str, list[Test]] = {}

@@ -61,7 +61,13 @@ def parts(columns: Floats, motion: Floats) -> Floats:
 def commanded_motions(fit: Fit, recording: Recording, masses: tuple[int, ...] = (0,)) -> Floats:
     """What the command alone does to masses: positions and velocities, shape (M, 2, N)."""
     force = recording.force - recording.force.mean()
-    return linear_motions(fit.model.system(fit.theta), force, recording.period_s, masses)
+    return linear_motions(fit.model.system(fit.theta).of_masses, force, recording.period_s, masses)
+
+
+def commanded_position(fit: Fit, recording: Recording) -> Floats:
+    """What the command alone makes of the position that is read, shape (N,)."""
+    force = recording.force - recording.force.mean()
+    return linear_motion(fit.model.system(fit.theta), force, recording.period_s)[0]
 
 
 def fitted_motion(fit: Fit, recording: Recording, acted: Floats | float) -> Floats:
@@ -75,7 +81,7 @@ def fitted_motion(fit: Fit, recording: Recording, acted: Floats | float) -> Floa
     acted : ndarray, shape (N,), or 0
         What they add to the position.
     """
-    known, period_s = commanded_motions(fit, recording)[0, 0], recording.period_s
+    known, period_s = commanded_position(fit, recording), recording.period_s
     left = recording.position - known
     if fit.model.held:
         edge_hz = hand_edge_hz(recording.position + acted, period_s)

@@ -24,6 +24,7 @@ from bayeshaptic.diagnosis.trials.forces.search import (
 from bayeshaptic.diagnosis.trials.forces.trial import force_trial
 from bayeshaptic.diagnosis.trials.forces.tryout import Point, Tryout
 from bayeshaptic.diagnosis.trials.other_laws import in_the_place_of_one
+from bayeshaptic.diagnosis.trials.other_side import as_seen_from, turned
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR
 from bayeshaptic.effects.nonlinear.protocol import CommandEffect, NonlinearEffect
@@ -45,9 +46,19 @@ def nonlinear_trials(
     meter : Meter
         Says whether one more search for a force, or one more fit of one, is affordable.
     """
-    recording = state.etfe.unbroken
-    if recording is None or is_periodic(state.etfe):
+    if state.etfe.unbroken is None or is_periodic(state.etfe):
         return []  # of what repeats, as a mended recording may, the lines have trials of their own
+    found = _of_laws(state, raised, meter)
+    other = turned(state)
+    if other is None:
+        return found
+    return found + as_seen_from(state, other, _of_laws(other, raised, meter))
+
+
+def _of_laws(state: State, raised: set[str], meter: Meter) -> list[Trial]:
+    """The trials beside the linear effects of a state as they are."""
+    recording = state.etfe.unbroken
+    assert recording is not None
     tryout = Tryout(state, recording)
     motion = tryout.simulation.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
     firsts, others = called_for(state, variables(raised), motion)

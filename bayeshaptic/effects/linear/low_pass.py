@@ -52,6 +52,16 @@ class ActuatorLag(LinearEffect):
             return None
         return Unseen("time", "time constant", etfe.period_s, alone)
 
+    def on_the_other_side(
+        self, model: Model, etfe: Etfe, own: Floats
+    ) -> tuple[LinearEffect, Floats] | None:
+        """The filter of the position of as many poles; three are none that is known."""
+        filters = PositionFilter.candidates(model, etfe)
+        if self.order > len(filters):
+            return None
+        damping = [1.0] * (self.order - 1)
+        return filters[self.order - 1], np.array([1 / (2 * np.pi * own[0]), *damping])
+
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
         (lag,) = self.own(values)
         for _ in range(self.order):
@@ -104,13 +114,21 @@ class PositionFilter(LinearEffect):
         title = "1 / (2 pi cut-off)"
         return Unseen("time", title, etfe.period_s, own, *combined((0.35, 0.7, 1.4)))
 
+    def on_the_other_side(
+        self, model: Model, etfe: Etfe, own: Floats
+    ) -> tuple[LinearEffect, Floats] | None:
+        """The lag of as many stages, which of two poles are equal."""
+        lag = ActuatorLag.candidates(model, etfe)[self.order - 1]
+        return lag, np.array([1 / (2 * np.pi * own[0])])
+
     def apply(self, system: LinearSystem, values: Mapping[str, Floats]) -> LinearSystem:
         cut_off, *damping = self.own(values)
         lag = 1 / (2 * np.pi * cut_off)
         if self.order == 1:
-            return system.with_filter(*_first_order(lag))
+            return system.with_filter(*_first_order(lag), of_position=True)
         one = np.ones_like(lag)
-        return system.with_filter(one[None], np.stack([one, 2 * damping[0] * lag, lag**2]))
+        poles = np.stack([one, 2 * damping[0] * lag, lag**2])
+        return system.with_filter(one[None], poles, of_position=True)
 
 
 def _first_order(lag: Floats) -> tuple[Floats, Floats]:

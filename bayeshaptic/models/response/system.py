@@ -26,7 +26,7 @@ class LinearSystem:
     mechanism : Mechanism
     delay_s : ndarray, shape (B,)
     filters : tuple of Filter
-        Rational factors before or after the mechanism (they commute).
+        Rational factors before or after the mechanism (they commute, but for forces inside it).
     dynamic_links : tuple of DynamicLink
         Further forces inside the mechanism, not rational in s.
     """
@@ -62,8 +62,32 @@ class LinearSystem:
         """What the dynamic links add to the rational part."""
         return remainder_of(self.mechanism, self.dynamic_links, self.filters)
 
-    def with_filter(self, numerator: Polynomial, denominator: Polynomial) -> LinearSystem:
-        return replace(self, filters=(*self.filters, Filter(numerator, denominator)))
+    @property
+    def of_masses(self) -> LinearSystem:
+        """From the command to how the masses move: without what filters the position."""
+        return self._with(tuple(f for f in self.filters if not f.of_position))
+
+    @property
+    def of_forces(self) -> LinearSystem:
+        """From a force at the motor to the position that is read: without the actuator's filters.
+
+        The command's delay is not left out here.
+        """
+        return self._with(self.sensing)
+
+    @property
+    def sensing(self) -> tuple[Filter, ...]:
+        """The filters of the position."""
+        return tuple(factor for factor in self.filters if factor.of_position)
+
+    def _with(self, filters: tuple[Filter, ...]) -> LinearSystem:
+        return self if len(filters) == len(self.filters) else replace(self, filters=filters)
+
+    def with_filter(
+        self, numerator: Polynomial, denominator: Polynomial, of_position: bool = False
+    ) -> LinearSystem:
+        factor = Filter(numerator, denominator, of_position)
+        return replace(self, filters=(*self.filters, factor))
 
     def with_dynamic_link(self, link: DynamicLink) -> LinearSystem:
         return replace(self, dynamic_links=(*self.dynamic_links, link))

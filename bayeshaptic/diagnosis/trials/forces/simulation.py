@@ -36,6 +36,7 @@ from bayeshaptic.effects.nonlinear.internal_force import (
 from bayeshaptic.effects.nonlinear.observer import correction, stretched
 from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect, Motion
 from bayeshaptic.models import Model
+from bayeshaptic.models.response.filters import in_time
 from bayeshaptic.models.response.motion import linear_motion, linear_motions
 from bayeshaptic.numerics.spending import spend
 from bayeshaptic.recordings.recording import Recording
@@ -103,8 +104,10 @@ class Simulation:
 
     def motions(self, theta: Floats, places: tuple[Place, ...]) -> dict[Place, Motion]:
         """Position and velocity at places, on the fine grid, beside the forces that are there."""
-        linear = self._linear(theta, self.arriving(()), places)
-        taken = self._besides(theta, places).of(self._left(linear) - self.there)
+        arriving = self.arriving(())
+        linear = self._linear(theta, arriving, places)
+        left = self._left(theta, arriving, linear)
+        taken = self._besides(theta, places).of(left - self.there)
         return self._moving(theta, places, linear, taken)
 
     def added(
@@ -181,8 +184,9 @@ class Simulation:
         order = sorted(range(len(acting)), key=lambda i: acting[i].effect.sticks)
         places = _places(acting)
         laws = [one.effect.law(one.strength, self.model, theta) for one in acting]
-        linear = self._linear(theta, self.arriving(forces), places)
-        left, mechanism = self._left(linear), self.model.system(theta).mechanism
+        arriving, system = self.arriving(forces), self.model.system(theta)
+        linear = self._linear(theta, arriving, places)
+        left, mechanism = self._left(theta, arriving, linear), system.mechanism
         period, away = self.recording.period_s, 1e3 * np.ptp(self.recording.position)
 
         def forced(taken: Floats) -> Floats:
@@ -197,7 +201,8 @@ class Simulation:
                 position = there.position + seen
                 internal.append(Internal(acting[i].effect.place, laws[i], position, there.velocity))
             added = np.empty((len(acting), len(left)))
-            added[order] = forced_motion(mechanism, internal, period / SUBSTEPS, SUBSTEPS)
+            moved = forced_motion(mechanism, internal, period / SUBSTEPS, SUBSTEPS)
+            added[order] = in_time(system.sensing, moved, period)
             return added if np.all(np.abs(added) < away) else np.full_like(added, np.nan)
 
         return self._besides(theta, places), left, forced
@@ -218,15 +223,18 @@ class Simulation:
 
         Of the motor always, on the fine grid.
         """
-        system = self.model.system(theta)
+        system = self.model.system(theta).of_masses
         # The second mass of a rigid device is that of a vibration mode.
         both = {LOAD, CONNECTION} & set(places) and "kc" in self.model.names
         masses = (0, 1) if both else (0,)
         return linear_motions(system, command, self.recording.period_s, masses, SUBSTEPS)
 
-    def _left(self, linear: Floats) -> Floats:
-        """The measured position less what a command does, (N,)."""
-        return np.asarray(self.recording.position - linear[0, 0, ::SUBSTEPS])
+    def _left(self, theta: Floats, command: Floats, linear: Floats) -> Floats:
+        """The measured position less what a command does to it, (N,)."""
+        own, system = linear[0, 0, ::SUBSTEPS], self.model.system(theta)
+        if system.sensing:
+            own = linear_motion(system, command, self.recording.period_s)[0]
+        return np.asarray(self.recording.position - own)
 
     def _moving(
         self, theta: Floats, places: tuple[Place, ...], linear: Floats, taken: Floats
