@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.base.high_passed import TOPIC as HIGH_PASSED
 from bayeshaptic.diagnosis.result import Result
+from bayeshaptic.numerics.spending import BUDGET_S
 from bayeshaptic.recordings.checks.against_device import says_the_mass
 from bayeshaptic.recordings.checks.check import USUAL_SECONDS
 from bayeshaptic.recordings.checks.loop_period import rows_are_uneven
@@ -17,6 +18,7 @@ from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.report.beyond_band import beyond_band
 from bayeshaptic.report.numbers.result import is_unexplained, may_be_held, said_who_holds
+from bayeshaptic.report.numbers.stand_ins import not_tried
 from bayeshaptic.report.numbers.stiffest import too_stiff
 from bayeshaptic.report.objections import changes, is_open, is_the_rest
 
@@ -42,6 +44,7 @@ class Step:
 
 # What is said of how the file is read, and of the device: the next report needs it, too.
 _KEPT = ("columns", "period_s", "delay_s", "encoder_resolution", "held")
+_LONGER = 5.0  # times the budget of a search that was not enough
 _NOT_ONE_MASS = (
     "Or ask whether it is another device: one mass, as was declared, does not explain this motion. "
     "Without --model rigid those of two masses, free and held, are tried. This recording will do:"
@@ -85,6 +88,10 @@ def next_steps(
         return (_in_open_loop(new),)
     if any(notice.topic == HIGH_PASSED for notice in analysis.notices):
         return _after_filter(result, command, new)
+    if result.closed is not None and not_tried(result.closed):
+        budget = float(options.get("budget") or BUDGET_S)
+        more = f"{command} --budget {_LONGER * budget:.0f}"
+        return (Step("Let the search for forces go on. This recording will do:", more),)
     return (_after_fit(result, command, new),)
 
 

@@ -18,6 +18,7 @@ from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.types import Floats
 
 Variants = list[NonlinearEffect]  # of one effect
+FIT_OF = ", its fit"  # behind a law's title: what was not tried of it
 
 _CLEARLY = 6.0  # standard deviations, where first order promises 18: see `_followed`
 _IN_REACH = 0.5  # of the largest score: the rest is worth less than a quarter of the best
@@ -41,7 +42,7 @@ def fitted(
         if point.gain_fit < faint:
             continue
         worth = worth_following(point, found)
-        follow = worth and meter.affords(f"{point.effect.title}, its fit")
+        follow = worth and meter.affords(f"{point.effect.title}{FIT_OF}")
         found.append(fit_force(tryout, point) if follow else point)
     # The linear parameters were fitted once more after the motion was simulated.
     return [one for one in found if tryout.stays(one)]
