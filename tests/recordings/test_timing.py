@@ -89,6 +89,9 @@ WRONG = {
     "4 rows have the time of the row before them, the first is row 9 .*twice": np.sort(
         np.append(EVEN, EVEN[[7, 50, 51, 300]])
     ),
+    "out of turn.* row 12 .0.01 s. after 0.011 s .2 such places.; sort the rows": EVEN[
+        [*range(10), 11, 10, *range(12, 502), 503, 502, *range(504, N)]
+    ],
     "most rows have the time .* too coarse .*--period-s": np.floor(EVEN[:1200] + 0.7),
     "the time in row 4 is nan": replaced(3, np.nan),
     "not even: they vary by 58 %": np.cumsum(1e-3 * RNG.uniform(1e-3, 2, size=N)),

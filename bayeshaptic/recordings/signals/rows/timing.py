@@ -106,6 +106,13 @@ def sampling_period(
     return Timing(float(period_s), stamps.jitter)
 
 
+def _only_out_of_turn(time_s: Floats, period: float) -> bool:
+    """Whether stamps are those of every row, a few of which stand some rows early or late."""
+    order = np.argsort(time_s, kind="stable")
+    far = int(np.max(np.abs(order - np.arange(len(order)))))
+    return far <= LONGEST_GAP and bool(np.all(np.diff(time_s[order]) > 0.5 * period))
+
+
 def _from_stamps(time_s: Floats, where: str) -> Timing:
     if len(time_s) < 3:
         raise InputError(f"{where}: {len(time_s)} time stamps; a period needs at least 3")
@@ -133,6 +140,12 @@ def _from_stamps(time_s: Floats, where: str) -> Timing:
         raise InputError(
             f"{where}: {len(back)} rows have the time of the row before them, the first is row "
             f"{back[0] + 2} ({time_s[back[0]]:.9g} s): are they in the file twice? Remove them"
+        )
+    if len(back) and _only_out_of_turn(time_s, period):
+        raise InputError(
+            f"{where}: rows stand out of turn, as a network may deliver them: row {back[0] + 2} "
+            f"({time_s[back[0] + 1]:.9g} s) after {time_s[back[0]]:.9g} s "
+            f"({such(len(back), 'place')}); sort the rows by their time"
         )
     if len(back):
         raise InputError(
