@@ -18,6 +18,7 @@ from bayeshaptic.inference import choose, criterion
 from bayeshaptic.inference.choose import UNDECIDED, Choice, ScoredFit
 from bayeshaptic.models.hand import from_a_hand
 from bayeshaptic.numerics.spending import RATE, Meter, spend
+from bayeshaptic.rig import Bench, WhiteNoise, critical_limit, simulate
 
 SIZES = {"rigid": 2, "free": 6, "chain-2": 10, "grasped": 11}
 
@@ -28,6 +29,7 @@ def fit(name: str, chi_square: float, further: int = 0) -> Any:
         model=SimpleNamespace(name=name, size=SIZES[name] + further, held=name == "grasped"),
         residual=np.full(300, np.sqrt(chi_square)),
         reduced_chi_square=chi_square,
+        run_away=False,
     )
 
 
@@ -347,6 +349,22 @@ def test_a_third_mass_is_no_hand(tmp_path) -> None:
     grasped = choice.candidates["grasped"]
     assert grasped.fit.reduced_chi_square < 1.2
     assert grasped.score > choice.candidates["chain-2"].score + UNDECIDED
+
+
+def test_one_mass_on_a_spring_is_a_joystick_and_no_second_mass_that_is_the_ground() -> None:
+    inertia, spring = 8e-4, 8e-4 * (2 * np.pi * 3) ** 2
+    joystick = Bench(
+        "rigid", {"m": inertia, "b": 3e-3}, 1e-3, 1e-3, "Nm", encoder_resolution=2 * np.pi / 16384
+    ).with_effect("centring_stiffness", stiffness=spring)
+    run = simulate(joystick, WhiteNoise(0.3, 300.0, 0.3, 10.0), seed=3)
+    recording = bh.recording_from_arrays(**run.signals)
+    found = bh.close_loop(recording, delay_s=1e-3, held=False)
+    assert found.analysis.model.name == "rigid"
+    assert found.effect_names == ("centring_stiffness",)
+    low, median, high = np.log(found.analysis.limit.quantile(np.array([0.05, 0.5, 0.95])))
+    off = median - np.log(critical_limit(joystick).stiffness)
+    assert abs(off) < 1.5 * (high - low)  # five standard deviations
+    assert high - low < 0.05
 
 
 def test_one_mass_in_a_hand_is_a_held_device(tmp_path) -> None:

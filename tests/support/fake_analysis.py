@@ -59,7 +59,7 @@ class FakeAnalysis(SimpleNamespace):
 class FakeClosed(SimpleNamespace):
     """The parts of a `Closed`, each of which may be changed."""
 
-    effects, force, changing_at_limit, before_like_after = (), None, 0.0, None
+    effects, effect_names, force, changing_at_limit, before_like_after = (), (), None, 0.0, None
     may_be_held_by_friction = False
     closed = property(lambda self: self)
     verdict = property(lambda self: self.diagnosis["verdict"])

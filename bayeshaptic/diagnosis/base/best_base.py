@@ -100,7 +100,7 @@ def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced
         own.go_on()
     if not rivals and own.traced.verdict == UNEXPLAINED:
         rivals = doubted or _beside_a_force(begun, own.traced)
-    elif own.done and (not own.state.accepted or _is_the_least(own.traced, begun, rivals)):
+    elif own.done and _stands_alone(own.traced, begun, rivals):
         rivals = ()
     if not rivals:
         return begun, own.traced
@@ -120,21 +120,24 @@ def _rivals(begun: Begun) -> tuple[str, ...]:
 
     A hand that is like no hand counts as a misfit.  A rigid device with a mode is a free one, and a
     free one with a mode on its body is a chain.  One with a mode on its motor is no chain: so
-    beside a chain that misfits, the free device is tried, too.
+    beside a chain that misfits, the free device is tried, too.  A free device of which a mass has
+    run away is one mass with what it lacks: on the spring of a joystick, say, whose other end is no
+    mass but the ground.
     """
     choice = begun.choice
     if choice is None:
         return ()
     chosen = choice.candidates[begun.fit.model.name]
     like_no_hand = 11.1  # chi-square of five numbers: one hand in twenty
+    simpler = ("rigid",) if begun.fit.model.name == "free" and begun.fit.run_away else ()
     if begun.fit.reduced_chi_square < MISFIT and chosen.from_a_hand < like_no_hand:
-        return ()
+        return simpler
     others = {name: one for name, one in choice.candidates.items() if name != "rigid"}
     if begun.fit.model.name == "rigid":
         return tuple(name for name in others if name != "chain-2")
     best = _best_other(choice, chosen)
     beside = ["free"] if begun.fit.model.name == "chain-2" and "free" in others else []
-    return (*best, *beside)
+    return (*simpler, *best, *beside)
 
 
 def _best_other(choice: Choice, chosen: ScoredFit) -> tuple[str, ...]:
@@ -177,11 +180,14 @@ def _hardly_worse(begun: Begun) -> tuple[str, ...]:
     )
 
 
-def _is_the_least(own: Traced, begun: Begun, rivals: tuple[str, ...]) -> bool:
-    """Whether one effect explains everything, on the simplest base model that there is."""
+def _stands_alone(own: Traced, begun: Begun, rivals: tuple[str, ...]) -> bool:
+    """Whether a base model lacks nothing, or one effect, and is then the simplest that there is."""
+    if begun.fit.run_away:
+        return False
     sizes = [begun.choice.candidates[name].fit.model.size for name in rivals if begun.choice]
     simple = own.verdict == EXPLAINED and len(own.state.accepted) == 1
-    return simple and all(begun.fit.model.size < size for size in sizes)
+    least = simple and all(begun.fit.model.size < size for size in sizes)
+    return least or not own.state.accepted
 
 
 def _comparable(
