@@ -103,7 +103,8 @@ def held():
     recording = bh.recording_from_arrays(**simulate(bench, noise, seed=6).signals)
     etfe = bh.estimate_etfe(recording)
     model = bh.grasped(delay_s=bench.delay_s, period_s=bench.period_s)
-    return etfe, bh.least_squares(model, etfe), bench.true_critical_stiffness()
+    one_set = bh.least_squares(model, etfe, most_sets=1)  # others may end in the better valley
+    return etfe, one_set, bench.true_critical_stiffness()
 
 
 def test_a_fit_tells_what_else_fits_as_well(held):
