@@ -32,10 +32,9 @@ from bayeshaptic.report.numbers.misfit import (
     residual_is_noticed,
 )
 from bayeshaptic.report.numbers.result import said_who_holds
-from bayeshaptic.report.numbers.stand_ins import stand_ins
+from bayeshaptic.report.numbers.stand_ins import MOSTLY, is_the_rest, stand_ins
 from bayeshaptic.report.numbers.stiffest import too_stiff
 from bayeshaptic.report.numbers.unstated import unstated
-from bayeshaptic.stability.critical import critical_stiffness
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
@@ -46,10 +45,6 @@ _OPEN = 10.0  # times the lower end of the limit's 90 % interval: a median beyon
 # Of the power of the response at the limit: from 0.28 on friction may be all of the damping there.
 # It is asked only where the noise of the device is flagged: in none of 60 clean recordings.
 _CHANGES = 0.25
-# Times the limit before a force was taken off: 14 to 27 in three recordings whose friction was 6 to
-# 11 % too small and whose limits were 10 times too high.  None of 14 recordings of strangers in
-# which a force was taken off is refused by it, nor of 86 others; five looked at have 1.0 to 1.5.
-_MOSTLY = 10.0
 _NO_LAW = {
     GAIN.test: "the gain of the actuator ripples along the way, which was not taken off, and where "
     "it is largest the limit is lower by that",
@@ -82,7 +77,7 @@ def _of_the_loop(closed: Closed) -> list[str]:
     if is_the_rest(closed):
         found.append(
             "a force was taken off that made the limit look more than "
-            f"{_MOSTLY:.0f} times as high, so that what is left of the damping is less than an "
+            f"{MOSTLY:.0f} times as high, so that what is left of the damping is less than an "
             "error of a tenth in that force"
         )
     reasons = (held_still(closed), stand_ins(closed), beyond_band(closed))
@@ -291,15 +286,3 @@ def _rubs_otherwise(closed: Closed) -> bool:
     if acts and closed.force is None and not (direct or closed.model.held):
         left |= {test.name for test in closed.traced.after if test.noticed}
     return bool(variables(left) & {VELOCITY, LOAD_VELOCITY, ALONG})
-
-
-def is_the_rest(closed: Closed) -> bool:
-    """Whether the limit is a small difference of two large ones, with a force and without it."""
-    if not any(effect.family == "nonlinear" for effect in closed.effects):
-        return False
-    bare, after = closed.traced.without_forces, closed.analysis.limit.quantile(0.5)
-    if bare is None or bare.model is closed.base.fit.model:
-        before = float(closed.base.limit.quantile(0.5))
-    else:  # what linear effects that were found first did to the limit is theirs
-        before = critical_stiffness(bare.model, bare.theta).value
-    return bool(math.isfinite(before) and before > _MOSTLY * after)

@@ -17,8 +17,9 @@ from bayeshaptic.diagnosis.widening.friction import (
 )
 from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.report import objections
-from bayeshaptic.report.objections import _rubs_otherwise, is_the_rest
+from bayeshaptic.report.numbers import stand_ins
+from bayeshaptic.report.numbers.stand_ins import is_the_rest
+from bayeshaptic.report.objections import _rubs_otherwise
 
 
 def closed(
@@ -123,6 +124,6 @@ def test_a_limit_is_no_small_difference_of_two_large_ones(
         traced=SimpleNamespace(without_forces=fit),
     )
     monkeypatch.setattr(
-        objections, "critical_stiffness", lambda model, theta: SimpleNamespace(value=bare)
+        stand_ins, "critical_stiffness", lambda model, theta: SimpleNamespace(value=bare)
     )
     assert is_the_rest(what) == objects

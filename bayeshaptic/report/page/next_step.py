@@ -18,9 +18,9 @@ from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.report.beyond_band import beyond_band
 from bayeshaptic.report.numbers.result import is_unexplained, may_be_held, said_who_holds
-from bayeshaptic.report.numbers.stand_ins import not_tried
+from bayeshaptic.report.numbers.stand_ins import is_the_rest, not_tried
 from bayeshaptic.report.numbers.stiffest import too_stiff
-from bayeshaptic.report.objections import changes, is_open, is_the_rest
+from bayeshaptic.report.objections import changes, is_open
 
 if TYPE_CHECKING:
     from bayeshaptic.report.headline import Headline
