@@ -119,6 +119,80 @@ def _put(into: Floats, cells: Floats, likely: float, off: tuple[float, float], u
                 into[at + 1] += part * mass
 
 
+@kernel(inline=True)
+def _expected(
+    now: Floats,
+    share: Floats,
+    speed: Floats,
+    law: tuple[float, float, float, float],
+    times: tuple[float, float],
+    off: float,
+    cell: float,
+) -> tuple[float, float, float, float, float]:
+    """Where it will be, so that the grid goes with it: the count that is read corrects it.
+
+    Means of the velocity at the end, of the position in the sample, from the count's lower edge, of
+    the way from there to the end, of both, and of the position squared.
+    """
+    force, dry, damping, mass = law
+    v, x, ahead, with_v, spread = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(len(share)):
+        if share[i] > 1e-13:
+            seen = _moved(speed[i], force, dry, damping, mass, times[0])
+            end = _moved(speed[i], force, dry, damping, mass, times[1])
+            at = seen[0] + off
+            for j in range(now.shape[1]):
+                at += now[i, j] / share[i] * (j + 0.5) * cell
+            v += share[i] * end[1]
+            x += share[i] * at
+            ahead += share[i] * (end[0] - seen[0])
+            with_v += share[i] * at * end[1]
+            spread += share[i] * at**2
+    return v, x, ahead, with_v, spread
+
+
+@kernel(inline=True)
+def _stopped(
+    into: Floats,
+    cells: Floats,
+    moving: tuple[float, int, float],
+    law: tuple[float, float, float, float],
+    force_sd: float,
+    times: tuple[float, float],
+    grid: tuple[float, float, float, float, int, int],
+) -> None:
+    """Add a row that is stopped, and stays or turns: parts of the white forces that do that.
+
+    `moving` is the row's velocity, its way, and the largest white force that stops it, in standard
+    deviations; `grid` the beginning of a row, from the count and from that of `into`, the size of a
+    cell of positions and of velocities, cells a count, and the first velocity.
+    """
+    v, way, top = moving
+    force, dry, damping, mass = law
+    base, moves, cell, fine, unit, first = grid
+    rest = len(into) - 1
+    for part in range(_PARTS if top > -_FAR else 0):
+        z = -_FAR + (top + _FAR) * part / _PARTS
+        ends = z + (top + _FAR) / _PARTS
+        likely = _below(ends) - _below(z)
+        if likely > 1e-11:
+            total = force + way * 0.5 * (z + ends) * force_sd
+            seen = _moved(v, total, dry, damping, mass, times[0])
+            end = _moved(v, total, dry, damping, mass, times[1])
+            off = (base + seen[0] / cell, moves + end[0] / cell)
+            if end[1] == 0:
+                _put(into[rest], cells, likely, off, unit)
+            else:  # between two rows of one sign
+                row = end[1] / fine - 0.5 - first
+                j = int(math.floor(row))
+                nearer = 1 - (row - j)
+                if j + first == -1:
+                    j, nearer = (j + 1 if end[1] > 0 else j), 1.0
+                j = min(max(j, 0), rest - 2)
+                _put(into[j], cells, likely * nearer, off, unit)
+                _put(into[j + 1], cells, likely * (1 - nearer), off, unit)
+
+
 @kernel
 def _followed(
     values: Floats,
@@ -155,22 +229,13 @@ def _followed(
     for k in range(whole, len(position) - 1):
         force = command[k - whole] - offset
         low = position[k + 1] - unit / 2
-        # Where it will be, so that the grid goes with it: the count that is read corrects it.
-        v, x, ahead, with_v, spread = 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(speeds + 1):
             share[i] = np.sum(now[i])
             speed[i] = (slowest + i + 0.5) * fine if i < rest else 0.0
-            if share[i] > 1e-13:
-                seen = _moved(speed[i], force, dry, damping, mass, read)
-                end = _moved(speed[i], force, dry, damping, mass, period_s)
-                at = seen[0]
-                for j in range(width):
-                    at += now[i, j] / share[i] * (start + j + 0.5) * cell
-                v += share[i] * end[1]
-                x += share[i] * (at - low)
-                ahead += share[i] * (end[0] - seen[0])
-                with_v += share[i] * (at - low) * end[1]
-                spread += share[i] * (at - low) ** 2
+        law = (force, dry, damping, mass)
+        v, x, ahead, with_v, spread = _expected(
+            now, share, speed, law, (read, period_s), start * cell - low, cell
+        )
         by = force_sd * read_twice / mass
         gain = (with_v - x * v + by * pushed) / (max(spread - x * x, 0.0) + by**2 + unit**2 / 6)
         v += gain * (unit / 2 - x)
@@ -199,28 +264,12 @@ def _followed(
                         end_at = speed[i] * once + pull * twice
                         off = (base + seen_at / cell, moves + end_at / cell)
                         _put(after[j], now[i], likely, off, cells)
-                # It is stopped, and stays or turns: parts of the white forces that do that.
-                top = min(-way * usual / pushed, _FAR)
-                for part in range(_PARTS if i < rest and top > -_FAR else 0):
-                    z = -_FAR + (top + _FAR) * part / _PARTS
-                    ends = z + (top + _FAR) / _PARTS
-                    likely = _below(ends) - _below(z)
-                    if likely > 1e-11:
-                        total = force + way * 0.5 * (z + ends) * force_sd
-                        seen = _moved(speed[i], total, dry, damping, mass, read)
-                        end = _moved(speed[i], total, dry, damping, mass, period_s)
-                        off = (base + seen[0] / cell, moves + end[0] / cell)
-                        if end[1] == 0:
-                            _put(after[rest], now[i], likely, off, cells)
-                        else:  # between two rows of one sign
-                            row = end[1] / fine - 0.5 - first
-                            j = int(math.floor(row))
-                            nearer = 1 - (row - j)
-                            if j + first == -1:
-                                j, nearer = (j + 1 if end[1] > 0 else j), 1.0
-                            j = min(max(j, 0), speeds - 2)
-                            _put(after[j], now[i], likely * nearer, off, cells)
-                            _put(after[j + 1], now[i], likely * (1 - nearer), off, cells)
+                if i < rest:
+                    grid = (base, moves, cell, fine, cells, first)
+                    top = min(-way * usual / pushed, _FAR)
+                    _stopped(
+                        after, now[i], (speed[i], way, top), law, force_sd, (read, period_s), grid
+                    )
             if i == rest:
                 likely = _below((dry - force) / force_sd) - _below((-dry - force) / force_sd)
                 _put(after[rest], now[i], likely, (base, moves), cells)
