@@ -27,8 +27,8 @@ from bayeshaptic.inference.time_domain.widths.correlated import FREEDOM
 from bayeshaptic.models import rigid
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats
-from benchmarks.one_mass_bound import bound, spreads, with_limit
-from benchmarks.one_mass_exact import of_counts
+from benchmarks.bounds.one_mass import bound, spreads, with_limit
+from benchmarks.bounds.one_mass_exact import of_counts
 from benchmarks.recordings.one_mass import PERIOD_S, make
 
 DRAWS = 600

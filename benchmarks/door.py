@@ -29,14 +29,8 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.causality.causality import causality
 from bayeshaptic.recordings.signals.controller import share_by_a_law
 from bayeshaptic.rig import simulate
-from benchmarks.recordings.door import (
-    TRAPEZOIDS,
-    Case,
-    band_case,
-    closed_case,
-    open_case,
-    written_down,
-)
+from benchmarks.recordings.controllers import TRAPEZOIDS
+from benchmarks.recordings.door import Case, band_case, closed_case, open_case, written_down
 
 WEIGHTS = (10.0, 100.0)
 VERDICTS = ("feedback", "undecided", "open loop")

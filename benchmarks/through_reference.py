@@ -30,7 +30,8 @@ from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, run_loop
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats
-from benchmarks.recordings.door import controller_of, written_down
+from benchmarks.recordings.controllers import controller_of
+from benchmarks.recordings.door import written_down
 
 CONTROLLERS = ("P", "PD", "PI", "PID", "PD filtered")
 REFERENCES = ("steps", "ramps", "noise")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,10 +11,10 @@ from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.rig import Bench, Multisine, WhiteNoise, run_loop, simulate
 from bayeshaptic.types import Floats
+from benchmarks.recordings.controllers import Law, controller_of, low_passed, steps
 
 CONTROLLERS = ("P", "PD", "PI", "PID", "PD filtered", "PID saturated")
 REFERENCES = ("steps", "ramps", "noise", "wall with dither")
-TRAPEZOIDS = "trapezoids"  # of their own: they repeat, so that little in such a loop is chance
 EXCITATIONS = ("white", "coloured", "multisine", "sweep", "binary", "steps")
 LOGGED = ("at the sample", "a sample early", "a sample late", "a late command")
 # A loop that shakes at its limit is another experiment; so is one that does not move.
@@ -43,6 +42,8 @@ class Case:
         the force, and an open loop with the same force shows the same motion.
     recording : Recording
     bench : Bench
+    law : Law or None
+        The controller of a closed loop.
     """
 
     closed: bool
@@ -54,6 +55,7 @@ class Case:
     answer: float
     recording: Recording
     bench: Bench
+    law: Law | None = None
 
     @property
     def weight(self) -> float:
@@ -121,7 +123,7 @@ def closed_case(seed: int, reference: str | None = None) -> Case:
     ideal = run_loop(bench.quiet(), law.begin(), seconds, noise)
     answer = _answer(made.force, ideal.force)
     recording = written_down(made.force, made.position, bench, logged)
-    return Case(True, kind, reference, logged, device, friction, answer, recording, bench)
+    return Case(True, kind, reference, logged, device, friction, answer, recording, bench, law)
 
 
 def _bench(rng: np.random.Generator) -> tuple[Bench, str, bool]:
@@ -170,100 +172,10 @@ def _excitation(
         bits = rng.choice([-1.0, 1.0], samples // clock + 1)
         return rms * np.repeat(bits, clock)[:samples]
     if kind == "steps":
-        return rms * _steps(samples, period, rng)
+        return rms * steps(samples, period, rng)
     pole = float(np.exp(-2 * np.pi * rng.uniform(5, 100) * period))
-    noise = _low_passed(rng.normal(size=samples), pole)
+    noise = low_passed(rng.normal(size=samples), pole)
     return rms * noise / noise.std()
-
-
-def _steps(samples: int, period: float, rng: np.random.Generator) -> Floats:
-    """Levels that are held for some 0.2 to 2 s."""
-    hold = rng.uniform(0.2, 2.0)
-    edges = np.cumsum(rng.uniform(0.5, 1.5, samples) * hold / period).astype(int)
-    levels = rng.normal(size=samples)
-    return np.asarray(levels[np.searchsorted(edges, np.arange(samples), side="right")])
-
-
-def _low_passed(signal: Floats, pole: float) -> Floats:
-    from scipy.signal import lfilter
-
-    return np.asarray(lfilter([1 - pole], [1, -pole], signal))
-
-
-def _reference(
-    kind: str, samples: int, period: float, bandwidth: float, rng: np.random.Generator
-) -> Floats:
-    """A position to follow, of size one."""
-    if kind == "steps":
-        return _steps(samples, period, rng)
-    if kind == "ramps":
-        corners = _steps(samples, period, rng)
-        changes = np.flatnonzero(np.diff(corners))
-        at = np.concatenate([[0], changes, [samples]])
-        return np.interp(np.arange(samples), at, rng.normal(size=len(at)))
-    if kind == TRAPEZOIDS:
-        phase = np.arange(samples) * period / rng.uniform(1.2, 3.0) % 1.0
-        return np.interp(phase, [0.0, 0.2, 0.5, 0.7, 1.0], [0.0, 1.0, 1.0, 0.0, 0.0])
-    if kind == "noise":
-        pole = float(np.exp(-2 * np.pi * bandwidth * rng.uniform(0.5, 5.0) * period))
-        noise = _low_passed(_low_passed(rng.normal(size=samples), pole), pole)
-        return noise / noise.std()
-    return np.zeros(samples)
-
-
-@dataclass(frozen=True)
-class Law:
-    """A controller of the bench: how to begin with it, what it follows, and that one's size."""
-
-    begin: Callable[[], Callable[[int, float], float]]
-    wanted: Floats
-    size: float
-
-
-def controller_of(
-    kind: str,
-    reference: str,
-    bench: Bench,
-    seconds: float,
-    rng: np.random.Generator,
-    logged: str,
-) -> Law:
-    """A controller of some hertz of bandwidth."""
-    period = bench.period_s
-    samples = round(seconds / period)
-    mass = sum(v for key, v in bench.values.items() if key.startswith("m"))
-    bandwidth = float(np.exp(rng.uniform(np.log(0.8), np.log(12.0))))
-    omega = 2 * np.pi * bandwidth
-    stiffness = min(mass * omega**2, 0.3 * bench.true_critical_stiffness())
-    omega = float(np.sqrt(stiffness / mass))
-    damping = 2 * rng.uniform(0.3, 1.0) * mass * omega if "D" in kind else 0.0
-    integral = stiffness * omega * rng.uniform(0.02, 0.1) if "I" in kind else 0.0
-    size = rng.uniform(0.5, 3.0) * bench.force_rms / stiffness
-    most = stiffness * size * rng.uniform(0.5, 1.0) if "saturated" in kind else np.inf
-    filtered = "filtered" in kind or rng.random() < 0.3
-    pole = float(np.exp(-2 * np.pi * rng.uniform(20, 150) * period)) if filtered else 0.0
-    wanted = size * _reference(reference, samples, period, bandwidth, rng)
-    added = np.zeros(samples)
-    if reference == "wall with dither":
-        noise = _low_passed(rng.normal(size=samples), float(rng.uniform(0, 0.9)))
-        added = bench.force_rms * rng.uniform(0.3, 1.0) * noise / noise.std()
-
-    def begin() -> Callable[[int, float], float]:
-        smooth = last = total = read = 0.0
-
-        def control(k: int, position: float) -> float:
-            nonlocal smooth, last, total, read
-            now, read = (read if logged == "a late command" else position), position
-            smooth = pole * smooth + (1 - pole) * now
-            error = wanted[k] - smooth
-            rate, last = (smooth - last) / period, smooth
-            total += integral * period * error
-            force = stiffness * error + total - damping * rate + added[k]
-            return float(np.clip(force, -most, most))
-
-        return control
-
-    return Law(begin, wanted, size)
 
 
 def _answer(force: Floats, ideal: Floats) -> float:

@@ -15,7 +15,7 @@ from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.recordings import join_recordings, recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Floats
-from benchmarks.one_mass_exact import likely
+from benchmarks.bounds.one_mass_exact import likely
 from benchmarks.recordings.one_mass import Case
 
 PERIOD_S = 1e-3

@@ -8,7 +8,10 @@ from scipy.stats import kstest
 
 from bayeshaptic.recordings.signals.causality.innovations import innovations_answer
 from bayeshaptic.recordings.signals.causality.prediction import Prediction
+from bayeshaptic.rig import Bench
 from bayeshaptic.types import Floats
+from benchmarks.bounds.feedback import separation
+from benchmarks.recordings.controllers import Law, LowPassed
 
 SAMPLES = 3000
 
@@ -42,3 +45,18 @@ def test_in_open_loop_the_answer_is_chance_however_the_position_foretells_itself
 
 def test_an_answer_is_seen() -> None:
     assert np.mean(answers(0.0, fed_back=0.3) > 40.0) > 0.9
+
+
+def test_what_nobody_can_tell_is_known_where_it_can_be_written_down() -> None:
+    """A device too heavy to move: what the controller answers to is the noise of its sensor."""
+    pole, read, stiffness, force, samples = 0.5, 1e-6, 1e4, 0.02, 40_000
+    bench = Bench("rigid", {"m": 1e9, "b": 1.0}, sensor_noise_rms=read)
+    white = np.random.default_rng(1).standard_normal(samples)
+    added, noise = LowPassed.of_size(force, (pole,), white)
+    still = np.zeros(samples)
+    law = Law(stiffness, 0.0, 0.0, np.inf, pole, False, 1e-3, still, added, 1.0, noise)
+    # The filter of the position has the pole of the noise, so both are white beside each other.
+    share = (stiffness * (1 - pole) * read / noise.new) ** 2
+    told = separation(bench, law, recorded=1000, samples=samples)
+    # v is a mean of 40,000 squares, and the root halves its error.
+    assert abs(told / np.sqrt(1000 * np.log1p(share)) - 1) < 5 * 0.5 * np.sqrt(2 / 30_000)

@@ -15,7 +15,7 @@ import numpy as np
 
 from bayeshaptic.compiled import kernel
 from bayeshaptic.types import Floats
-from benchmarks.one_mass_bound import bound
+from benchmarks.bounds.one_mass import bound
 from benchmarks.recordings.one_mass import Case
 
 _CELLS = 24  # of a count; with 16 or 32 log likelihoods over 2,000 samples differ by 0.6 and 0.15
