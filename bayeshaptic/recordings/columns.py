@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bayeshaptic.errors import InputError, nearest
 from bayeshaptic.recordings.readers import Arrays
 from bayeshaptic.recordings.readers.numbers import as_numbers
-from bayeshaptic.recordings.units import base_unit, is_unit, unit_in_name
+from bayeshaptic.recordings.units import base_unit, is_unit, stem_and_unit, unit_in_name
 
 # What may stand for the force and for the position (`signals.other_outputs`), where it is named.
 FORCES, POSITIONS = ("force", "measured_force"), ("position", "velocity", "acceleration")
@@ -36,7 +36,7 @@ DEFAULT_HEADERS: dict[str, dict[str, str | None]] = {
     **{role: {} for role in (*FORCES[1:], *POSITIONS[1:])},
 }
 
-# The same in words, for headers that say their unit: "Time (s)", "Force [N]", "Position (mm)".
+# The same in words, for headers that say their unit: "Time (s)", "Force [N]", "position_mm".
 _PLAIN_HEADERS = {
     "time": ("time", "t"),
     "force": ("force", "torque", "current"),
@@ -210,6 +210,10 @@ def _defaults(arrays: Arrays, role: str) -> dict[str, str | None]:
             found[key] = unit
         elif unit is not None and plain in _PLAIN_HEADERS.get(role, ()):
             found[key] = unit
+    if not found:
+        ended = {key: stem_and_unit(role, key) for key in arrays}
+        plain_headers = _PLAIN_HEADERS.get(role, ())
+        found = {k: u for k, (stem, u) in ended.items() if u and stem.lower() in plain_headers}
     return found
 
 

@@ -142,7 +142,12 @@ def unit_by_name(role: str, name: str) -> str | None:
 
 
 def unit_in_name(role: str, name: str) -> str | None:
-    """The unit of a role that a name ends in: ``theta_deg``, ``speed_rad_s``; None without one.
+    """The unit of a role that a name ends in: ``theta_deg``, ``speed_rad_s``; None without one."""
+    return stem_and_unit(role, name)[1]
+
+
+def stem_and_unit(role: str, name: str) -> tuple[str, str | None]:
+    """A name without the unit of a role that it ends in, and that unit; all of it without one.
 
     One letter may be an index (``theta_m`` of a motor) and small letters a word: they hold where
     the name speaks of that unit, and one letter where it speaks of none.
@@ -160,8 +165,8 @@ def unit_in_name(role: str, name: str) -> str | None:
         spoken = unit_by_name(quantity, stem) if quantity in _BY_NAME else None
         exact = written in known and (len(written) > 1 or spoken is None)
         if exact or spoken == known[unit][0] or len(written) > 2:
-            return unit
-    return None
+            return stem, unit
+    return name, None
 
 
 def said_by_names(names: Mapping[str, str], units: Mapping[str, str | None]) -> tuple[Notice, ...]:

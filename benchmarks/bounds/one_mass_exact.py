@@ -1,6 +1,6 @@
 """What the counts of one mass say of its values: the likelihood on a grid, and its information.
 
-`one_mass_bound.py` knows at every sample which way friction acts, as nobody does who reads counts.
+`one_mass.py` knows at every sample which way friction acts, as nobody does who reads counts.
 Here the density of position and velocity is followed from one change of the delayed command to the
 next, on a grid that is finer than the encoder's counts and than what the white force does to the
 velocity in a sample, beside the mass at rest.  It shares nothing with the normals of

@@ -219,3 +219,40 @@ def test_headers_are_known_in_any_case(tmp_path: Path) -> None:
     write_csv(tmp_path / "c.csv", "time_s,force_n,Force_N")
     with pytest.raises(InputError, match="both force_n and Force_N; say which"):
         read_recording(tmp_path / "c.csv")
+
+
+@pytest.mark.parametrize(
+    ("header", "units", "factors"),
+    [
+        ("time_ms,force_mN,position_mm", ("N", "m"), (1e-3, 1e-3, 1e-3)),
+        ("time_s,force_Nm,position_rad", ("Nm", "rad"), (1.0, 1.0, 1.0)),
+        ("t_us,torque_mNm,angle_deg", ("Nm", "rad"), (1e-6, 1e-3, math.pi / 180)),
+    ],
+)
+def test_plain_words_that_end_in_a_unit_need_no_mapping(
+    tmp_path: Path, header: str, units: tuple[str, str], factors: tuple[float, float, float]
+) -> None:
+    path = tmp_path / "a.csv"
+    time = np.arange(len(FORCE)) / factors[0] * 1e-3
+    signals = np.column_stack([time, FORCE, POSITION])
+    np.savetxt(path, signals, delimiter=",", header=header, comments="")
+    recording = read_recording(path)
+    assert (recording.force_unit, recording.position_unit) == units
+    np.testing.assert_allclose(recording.period_s, 1e-3)
+    np.testing.assert_allclose(recording.force, FORCE * factors[1])
+    np.testing.assert_allclose(recording.position, POSITION * factors[2])
+
+
+def test_a_header_that_is_one_of_ours_comes_first(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    signals = np.column_stack([np.arange(len(FORCE)) * 1e-3, FORCE, POSITION, POSITION * 1e3])
+    np.savetxt(
+        path, signals, delimiter=",", header="time_s,force_n,position_m,position_mm", comments=""
+    )
+    np.testing.assert_allclose(read_recording(path).position, POSITION)
+    signals = signals[:, [0, 1, 3, 3]]
+    np.savetxt(
+        path, signals, delimiter=",", header="time_s,force_n,position_mm,angle_deg", comments=""
+    )
+    with pytest.raises(InputError, match="both position_mm and angle_deg"):
+        read_recording(path)
