@@ -118,7 +118,7 @@ def finish(
     )
     # Asked of the base model before; beside another effect a filter shows once that is there.
     if fit is not begun.fit and all(notice.topic != HIGH_PASSED for notice in notices):
-        notices += perhaps_high_passed(fit, etfe, begun.choice)
+        notices += perhaps_high_passed(fit, etfe, begun.choice, begun.measured.recording)
     if etfe.direct or etfe.through_reference:
         notices = with_units_of(fit, etfe.recording, begun.device, notices)
     return Analysis(

@@ -38,7 +38,7 @@ def recorded(
 
 def asked(recording: Recording, held: bool | None = None) -> tuple[Notice, ...]:
     begun = begin(recording, "auto", Options(held=held))
-    return perhaps_high_passed(begun.fit, begun.etfe, begun.choice)
+    return perhaps_high_passed(begun.fit, begun.etfe, begun.choice, recording)
 
 
 @pytest.mark.parametrize(("corner_hz", "order"), [(0.2, 1), (0.8, 1), (0.5, 2)])
@@ -75,3 +75,21 @@ def test_what_was_not_filtered_is_not_doubted(held: bool) -> None:
 def test_whole_counts_were_not_filtered_but_decimals_may_be() -> None:
     assert not asked(recorded(0.8, count=COUNT))
     assert asked(recorded(0.8, count=1e-6))
+
+
+def test_counts_stay_counts_when_something_is_taken_off_them() -> None:
+    begun = begin(recorded(0.8), "auto", Options())
+    assert not perhaps_high_passed(begun.fit, begun.etfe, begun.choice, recorded(0.8, count=COUNT))
+
+
+def test_a_damper_is_no_filter() -> None:
+    """A mass without damping behind a high-pass is one with damping, to the last digit."""
+    bench = Bench.from_device("phantom", False, "rigid", encoder_resolution=1e-9)
+    made = simulate(bench, WhiteNoise(0.05, 200.0, 0.7, 8.0), seed=1)
+    position = made.position + 1e-7 * np.random.default_rng(6).standard_normal(len(made.force))
+    signals = made.force, position, bench.period_s
+    recording = recording_from_arrays(*signals, force_unit="Nm", position_unit="rad")
+    begun = begin(recording, "auto", Options())
+    assert begun.choice is not None
+    larger = begun.choice.candidates["free"].fit  # the mass has lost a mode that it does not have
+    assert not perhaps_high_passed(larger, begun.etfe, begun.choice, recording)

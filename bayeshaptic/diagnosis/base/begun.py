@@ -60,7 +60,7 @@ def fitted(found: Opened, model: str | Model, options: Options) -> Begun:
         tried = {fit.model.name: fit}
         tried |= {name: one.fit for name, one in choice.candidates.items()} if choice else {}
         doubt = file_in_doubt(etfe, tried, found.device, options)
-        doubt = (*doubt, *perhaps_high_passed(fit, etfe, choice))
+        doubt = (*doubt, *perhaps_high_passed(fit, etfe, choice, found.etfe.recording))
     notices = (*found.notices, *doubt)
     parts = {**vars(found), "etfe": etfe, "notices": notices, "seconds": clock.seconds}
     return Begun(**parts, measured=found.etfe, fit=fit, choice=choice)

@@ -73,15 +73,17 @@ class HighPass:
         return system.with_filter(np.stack([none, none, lag**2]), poles)
 
 
-def perhaps_high_passed(fit: Fit, etfe: Etfe, choice: Choice | None) -> tuple[Notice, ...]:
+def perhaps_high_passed(
+    fit: Fit, etfe: Etfe, choice: Choice | None, as_recorded: Recording | None
+) -> tuple[Notice, ...]:
     """A warning where a device whose position was high-passed explains more.
 
     A base model that is no larger than the fit's, with a high-pass on its position, leaves nothing
-    but noise and has a lower limit.  Its information criterion is far better than that of the same
-    model without; or the criterion is better, or half of the motion that the fit leaves is gone,
-    and it leaves next to nothing of the whole motion, which a hand would have moved slowly.  Whole
-    counts of an encoder were not filtered, but a file may have rounded what was.  How often that is
-    so: docs/door.md.
+    but noise and has a lower limit, and the filter is worth its parameter.  Its information
+    criterion is far better than that of the fit, of the same model; or it is better, or half of the
+    motion that the fit leaves is gone, and next to nothing is left of the whole motion, which a
+    hand would have moved slowly.  Whole counts of an encoder were not filtered, but a file may have
+    rounded what was.  How often that is so: docs/door.md.
 
     Parameters
     ----------
@@ -91,9 +93,11 @@ def perhaps_high_passed(fit: Fit, etfe: Etfe, choice: Choice | None) -> tuple[No
         What it was fitted to.
     choice : Choice or None
         Where base models are found; None where a model was asked for.
+    as_recorded : Recording or None
+        Before anything was taken off its position, which are no counts after that.
     """
     recording = etfe.unbroken
-    if recording is None or _are_counts(recording):
+    if recording is None or as_recorded is None or _are_counts(as_recorded):
         return ()
     filtered = [
         least_squares(model.with_effect(HighPass.around(etfe.band_hz[0], order)), etfe, most_sets=1)
@@ -104,7 +108,10 @@ def perhaps_high_passed(fit: Fit, etfe: Etfe, choice: Choice | None) -> tuple[No
     better = [
         one
         for one in filtered
-        if not one.misfits and _limit(one) < own and _explains_more(one, fit, recording)
+        if not one.misfits
+        and _limit(one) < own
+        and _explains_more(one, fit, recording)
+        and _score(one) < _score(least_squares(_without_filter(one.model), etfe, most_sets=1))
     ]
     if not better:
         return ()
@@ -163,5 +170,9 @@ def _limit(fit: Fit) -> float:
     model, theta = fit.model, fit.theta
     if _CORNER in model.names:
         theta = np.delete(theta, model.names.index(_CORNER))
-        model = model.without_effect(model.effects[-1])
+        model = _without_filter(model)
     return float(critical_stiffness(model, theta).value)
+
+
+def _without_filter(model: Model) -> Model:
+    return model.without_effect(model.effects[-1])
