@@ -24,7 +24,7 @@ from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.readers import Arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.other_outputs import as_command_and_position
-from bayeshaptic.recordings.units import base_unit, kind_by_names, said_by_names, says_volts
+from bayeshaptic.recordings.units import base_unit, kind_by_names, said_by_names, says_drive
 from bayeshaptic.types import Floats
 
 
@@ -103,7 +103,7 @@ def recorded(path: Path, arrays: Arrays, said: Said) -> Recording:
     bare = {role: mapping[role].names[-1] for role in mapping if mapping[role].unit is None}
     notices = said_by_names(bare, written)
     if units[force] is None and force in mapping:
-        notices = (*notices, *_of_volts(force, mapping[force], recording.force_unit))
+        notices = (*notices, *_of_a_drive(force, mapping[force], recording.force_unit))
     return replace(recording, notices=recording.notices + notices)
 
 
@@ -119,14 +119,14 @@ def _refuse_clocks_of_their_own(force: Floats, position: Floats, path: Path) -> 
         )
 
 
-def _of_volts(role: str, force: Column, unit: str) -> tuple[Notice, ...]:
-    """A warning where the force's name says volts, and no factor makes a force of them."""
-    if force.factors[-1] != 1.0 or not says_volts(force.names[-1]):
+def _of_a_drive(role: str, force: Column, unit: str) -> tuple[Notice, ...]:
+    """A warning where the force's name says volts, or a duty, and no factor makes a force of it."""
+    said = says_drive(force.names[-1])
+    if force.factors[-1] != 1.0 or said is None:
         return ()
     text = (
-        f"The force's name, '{force.text}', says volts, and it is taken to be "
-        f"in {unit}: stiffness and masses are then wrong by the force of one "
-        f"volt, C. Write {role}=NAME*C[{unit}] in --columns."
+        f"The force's name, '{force.text}', says {said[0]}, and it is taken to be "
+        f"in {unit}: stiffness and masses are then wrong by the force of {said[1]}, C. Write {role}=NAME*C[{unit}] in --columns."
     )
     return (Notice("warning", "units", text, ("force",)),)
 

@@ -81,7 +81,12 @@ _CURES = {
     "force": "; multiply other units by the force constant, as in force=volts*35.15[N]",
     "position": "; multiply counts by the size of one, as in position=counts*3.1e-6[m]",
 }
-_VOLTS = re.compile(r"(?i:volt|\bdac(?![a-z]))|(?<![A-Za-z])m?V$")
+# What drives an amplifier, and is no force until its gain is known; and one unit of it.
+_DRIVES = {
+    ("volts", "one volt"): r"(?i:volt|\bdac(?![a-z]))|(?<![A-Za-z])m?V$",
+    ("a duty cycle", "one unit of it"): r"(?i:duty|pwm)",
+    ("per cent", "one per cent"): r"(?i:per_?cent|prozent|pct)|%",
+}
 _BY_ROLE = {
     "time": _TIME,
     "force": _FORCE,
@@ -210,9 +215,13 @@ def kind_by_names(force: str, position: str) -> str | None:
     return "rotational" if said & {"Nm", "rad"} and not said & {"N", "m"} else None
 
 
-def says_volts(name: str) -> bool:
-    """Whether a column's name says that it is in volts: ``u_V``, ``volts``, ``DAC 0``."""
-    return _VOLTS.search(name) is not None
+def says_drive(name: str) -> tuple[str, str] | None:
+    """What a column's name says of an amplifier's input, and one unit of that; None of a force.
+
+    Volts as in ``u_V``, ``volts``, ``DAC 0``, a duty cycle as in ``pwm``, or a share of what there
+    is as in ``effort_percent``.
+    """
+    return next((said for said, words in _DRIVES.items() if re.search(words, name)), None)
 
 
 def _plain(unit: str) -> str:

@@ -25,6 +25,19 @@ def test_a_force_that_is_called_volts(tmp_path: Path) -> None:
         assert not any(n.level == "warning" for n in notices)
 
 
+@pytest.mark.parametrize("name", ["duty_percent", "pwm", "Effort (%)", "u_V"])
+def test_what_drives_an_amplifier_is_no_force(tmp_path: Path, name: str) -> None:
+    write_csv(tmp_path / "a.csv", f"t,{name},q")
+    notices = read_recording(tmp_path / "a.csv", f"time=t,force={name}*1[N],position=q").notices
+    assert not any(n.level == "warning" for n in notices)
+    if "(" in name:
+        with pytest.raises(InputError, match="'%' is no unit of force.*force constant"):
+            read_recording(tmp_path / "a.csv", f"time=t,force={name},position=q")
+        return
+    (said,) = read_recording(tmp_path / "a.csv", f"time=t,force={name},position=q").notices[-1:]
+    assert (said.level, said.topic, said.about) == ("warning", "units", ("force",))
+
+
 COLUMN_TERMS = {
     "u": ("u", 1.0, None),
     "u*35.15[N]": ("u", 35.15, "N"),

@@ -49,6 +49,7 @@ def test_columns_are_recognised(tmp_path: Path, header: str) -> None:
     [
         ("t,tau,theta,v", "perhaps [rad] or [deg]"),
         ("t,dac_V,x,v", "volts? multiply by the force of one"),
+        ("t,duty,x,v", "a duty cycle? multiply by the force of one"),
         ("t,F (V),x (mm),v", "in V: multiply by the force of one"),
         ("t,F,x (counts),v", "in counts: multiply by the size of one"),
     ],

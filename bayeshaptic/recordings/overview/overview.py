@@ -28,7 +28,7 @@ from bayeshaptic.recordings.columns import (
 from bayeshaptic.recordings.overview.roles import ColumnFacts, guess_roles, says, says_number
 from bayeshaptic.recordings.readers import Arrays, read_arrays
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
-from bayeshaptic.recordings.units import base_unit, says_volts, unit_by_name, unit_in_name, units_of
+from bayeshaptic.recordings.units import base_unit, says_drive, unit_by_name, unit_in_name, units_of
 
 # What turns counts and volts into them.
 _FACTORS = {
@@ -198,8 +198,8 @@ def doubts(column: ColumnFacts, role: str) -> str:
         return "large for metres or radians: write the unit, as in [mm] or [deg]"
     if role == "force" and column.whole:
         return f"whole numbers: converter counts? {_FACTORS[role]}"
-    if role == "force" and says_volts(column.name):
-        return f"volts? {_FACTORS[role]}"
+    if role == "force" and (drive := says_drive(column.name)):
+        return f"{drive[0]}? {_FACTORS[role]}"
     units = units_of(role)
     guess = "rad] or [deg" if guess == "rad" else guess
     perhaps = f", perhaps [{guess}]" if guess else ""
