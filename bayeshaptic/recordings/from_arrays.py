@@ -13,6 +13,7 @@ from bayeshaptic.errors import InputError, Notice, such
 from bayeshaptic.recordings.readers.numbers import as_numbers
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.recordings.signals.rows.repeated import rows_read_once
 from bayeshaptic.recordings.signals.rows.runs import (
     force_held,
     force_held_unevenly,
@@ -147,11 +148,16 @@ def _on_a_clock(
 
     One row for each force, where the period that was said is that of the forces.
     """
+    again: tuple[Notice, ...] = ()
+    if stamps is not None:
+        once, again = rows_read_once(stamps, (signals.force, signals.position))
+        signals, stamps = signals[once], stamps[once]
     held = held_for(signals.force)
     each, first = written_each((signals.force,))
     if each > 1 and stamps is not None and _is_period(period_s, stamps, each):
         signals, stamps, held = signals[first::each], stamps[first::each], 1
-    return signals, sampling_period(stamps, period_s, where), held
+    timing = sampling_period(stamps, period_s, where)
+    return signals, replace(timing, notices=(*again, *timing.notices)), held
 
 
 def _continued(

@@ -126,7 +126,8 @@ def _of_a_drive(role: str, force: Column, unit: str) -> tuple[Notice, ...]:
         return ()
     text = (
         f"The force's name, '{force.text}', says {said[0]}, and it is taken to be "
-        f"in {unit}: stiffness and masses are then wrong by the force of {said[1]}, C. Write {role}=NAME*C[{unit}] in --columns."
+        f"in {unit}: stiffness and masses are then wrong by the force of {said[1]}, "
+        f"C. Write {role}=NAME*C[{unit}] in --columns."
     )
     return (Notice("warning", "units", text, ("force",)),)
 

@@ -49,6 +49,22 @@ def test_stamps_that_many_rows_share_say_the_period(coarse_s: float, seconds: in
         assert timing.jitter == 0
 
 
+def test_a_buffer_that_was_written_twice_is_read_once() -> None:
+    force, position = RNG.normal(size=N), 1e-6 * np.cumsum(RNG.normal(size=N))
+    rows = np.concatenate([np.arange(2048), np.arange(2016, 4096), np.arange(3000, N)])
+    for period_s in (None, 1e-3):
+        read = recording_from_arrays(force[rows], position[rows], period_s, EVEN[rows])
+        np.testing.assert_array_equal(read.force, force)
+        assert ("note", "time stamps") in [(n.level, n.topic) for n in read.notices]
+        assert f"{len(rows) - N} rows repeat" in " ".join(n.text for n in read.notices)
+    # Another reading at the same time is none, nor is a clock that began again.
+    other = position[rows]
+    other[2060] += 1e-6
+    for again, stamps in ((other, EVEN[rows]), (position[rows], 1e-3 * (rows % 2500))):
+        with pytest.raises(InputError, match="time does not advance"):
+            recording_from_arrays(force[rows], again, time=stamps)
+
+
 @pytest.mark.parametrize("jitter", [0.002, 0.02])
 def test_jitter_is_measured(jitter: float) -> None:
     stamps = EVEN + 1e-3 * jitter / np.sqrt(2) * RNG.normal(size=N)
