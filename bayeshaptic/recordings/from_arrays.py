@@ -20,6 +20,7 @@ from bayeshaptic.recordings.signals.rows.runs import (
     held_for,
     held_unevenly,
     left_out,
+    longest,
     moving_part,
     new_rows,
     position_held,
@@ -271,9 +272,11 @@ def _signal(values: ArrayLike, what: str, where: str) -> NDArray[np.float64]:
         )
     bad = np.flatnonzero(~np.isfinite(signal))
     if len(bad):
+        start, stop = longest(np.isfinite(signal))
         raise InputError(
             f"{where}: {what} is {signal[bad[0]]} in row {bad[0] + 1} ({such(len(bad), 'row')}); "
-            "fill them in, or read a part without them, with --rows A:B",
+            "remove them (few in one place are put back by their times), or read the longest part "
+            f"without, --rows {start + 1}:{stop}",
             topic="rows",
         )
     signal.setflags(write=False)

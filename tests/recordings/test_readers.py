@@ -300,7 +300,7 @@ WRONG_CSV = {
     "time_s,force_n,position_m\n": "a header .* but no rows",
     "time_s,force_n,position_m\n0,1,2\n0.001,1,2\na,b,c\n": "'b' is not a number in row 3",
     "time_s,force_n,position_m\n0,1,2\n0.001,x,3\n": "'force_n': 'x' is not a number in row 2",
-    "time_s,force_n,position_m\n0,1,2\n0.001,,3\n": "force is nan in row 2 .*fill them in",
+    "time_s,force_n,position_m\n0,1,2\n0.001,,3\n": "force is nan in row 2 .*--rows 1:1",
     "time_s,force_n,position_m\n0,1,2\n0.001,1\n0.002,1,2\n": "line 3 has 2 fields where 3 are",
     "time_s,force_n,position_m\n0,1,2\n0.001,1,2\n0.002,2,1\n0": "line 5 has 1 field .*remove",
     "time_s,force_n\n0,1\n0.001,2\n": r"no column for the position \(position_m or angle_rad\)",

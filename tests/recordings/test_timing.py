@@ -65,6 +65,22 @@ def test_a_buffer_that_was_written_twice_is_read_once() -> None:
             recording_from_arrays(force[rows], again, time=stamps)
 
 
+@pytest.mark.parametrize(
+    ("bits", "tick_s", "jitter"), [(16, 1e-5, 0), (16, 1e-6, 20), (32, 1e-9, 0)]
+)
+def test_a_timer_that_begins_again_is_counted_on(bits: int, tick_s: float, jitter: int) -> None:
+    ticks = np.round(0.3 / tick_s + EVEN / tick_s + jitter * RNG.normal(size=N))
+    for period_s in (None, 1e-3):
+        timing = sampling_period(ticks % 2**bits * tick_s, period_s)
+        assert timing.period_s == pytest.approx(1e-3, rel=1e-4)
+        assert timing.jitter == pytest.approx(jitter * tick_s * np.sqrt(2) / 1e-3, rel=0.1)
+        assert [n.level for n in timing.notices] == ["note"]
+        assert f"a timer of {bits} bits" in timing.notices[0].text
+    for range_ in (0.97 * 2**bits, 2**12 * 1e-3 / tick_s):  # neither a timer's, nor of a buffer
+        with pytest.raises(InputError):
+            sampling_period(np.round(EVEN / tick_s) % range_ * tick_s)
+
+
 @pytest.mark.parametrize("jitter", [0.002, 0.02])
 def test_jitter_is_measured(jitter: float) -> None:
     stamps = EVEN + 1e-3 * jitter / np.sqrt(2) * RNG.normal(size=N)

@@ -184,7 +184,7 @@ def doubts(column: ColumnFacts, role: str) -> str:
     if default_unit(role, column.name)[0]:
         return ""
     if column.missing:
-        return f"{column.missing} rows without a number: fill them in, or read a part without them"
+        return f"{column.missing} rows without a number: remove them, or read a part without"
     if column.unit is not None:
         return _factor_for(column.unit, role)
     if (unit := unit_in_name(role, column.name)) is not None:

@@ -22,6 +22,7 @@ _LATEST = 1e100
 # of a force that nobody knows for longer than this its own past says nothing.
 LONGEST_GAP, MOST_MISSING = 8, 0.01
 _WORTH_READING = 1000  # rows, about what a response can be read from
+_TIMER_BITS = 16, 24, 32
 LOOP = "loop"  # what a warning of the topic "period" is about, where it doubts the loop's period
 NOTABLE_JITTER = 0.005  # of the stamps: from here on worth a warning
 
@@ -90,8 +91,10 @@ def sampling_period(
                 "or give the sampling period with --period-s"
             )
         return Timing(float(period_s))
+    time_s, counted = _counted_on(time_s)
     if period_s is None:
-        return _from_stamps(time_s, where)
+        timing = _from_stamps(time_s, where)
+        return replace(timing, notices=(*counted, *timing.notices))
     try:
         stamps = _from_stamps(time_s, where)
     except InputError as error:
@@ -103,7 +106,31 @@ def sampling_period(
             f"{period_s:g} s, is used."
         )
         return Timing(float(period_s), stamps.jitter, (Notice("warning", "time stamps", text),))
-    return Timing(float(period_s), stamps.jitter)
+    return Timing(float(period_s), stamps.jitter, counted)
+
+
+def _counted_on(time_s: Floats) -> tuple[Floats, tuple[Notice, ...]]:
+    """The stamps of a timer that begins again after 2^16, 2^24 or 2^32 ticks, counted on; a note.
+
+    What each step back lacks of a usual one is the timer's range. Recordings that stand one after
+    the other begin at one time each, and are left as they are.
+    """
+    steps = np.diff(time_s)
+    back = np.flatnonzero(steps < 0)
+    tick = _rounding(time_s) if len(back) and time_s.min() >= 0 else 0.0
+    if not tick or np.all(time_s[back + 1] == time_s[0]):
+        return time_s, ()
+    usual = float(np.median(steps))
+    for bits in _TIMER_BITS:
+        lacks = usual - steps[back] - 2**bits * tick
+        if np.all(np.abs(lacks) < 0.5 * usual) and time_s.max() < 2**bits * tick:
+            turns = np.cumsum(np.append(0, steps < 0))
+            text = (
+                f"The time begins again after {2**bits:,} ticks of {tick:g} s, as a timer of "
+                f"{bits} bits does, the first time at row {back[0] + 2}: it was counted on."
+            )
+            return time_s + 2**bits * tick * turns, (Notice("note", "time stamps", text),)
+    return time_s, ()
 
 
 def _only_out_of_turn(time_s: Floats, period: float) -> bool:
