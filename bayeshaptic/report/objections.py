@@ -168,12 +168,17 @@ def _of_the_alignment(analysis: Analysis) -> list[str]:
     found = []
     sensed = any(notice.topic == NO_LOOP for notice in analysis.notices)
     if analysis.sampled and analysis.fit.impossible and not sensed:
-        found.append(
-            f"the best fit ends at a bound ({', '.join(analysis.fit.impossible)}), where no device "
-            "is: force and position may not be of the same sample, so that less delay is seen than "
-            "the loop has (a position written down a sample early); say the loop's delay with "
+        said = "delay_s" not in analysis.model.names
+        why = (
+            "something else that the model lacks looks like it, as a spring to the ground does; "
+            "say --modes and --held, where they are known"
+            if said
+            else "force and position may not be of the same sample, so that less delay is seen "
+            "than the loop has (a position written down a sample early); say the loop's delay with "
             "--delay-s, also where it is zero"
         )
+        ends = ", ".join(analysis.fit.impossible)
+        found.append(f"the best fit ends at a bound ({ends}), where no device is: {why}")
     moved = any(notice.topic == MOVED for notice in analysis.notices)
     if moved and "delay_s" in analysis.model.names:
         found.append(

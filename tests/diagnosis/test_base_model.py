@@ -208,6 +208,28 @@ def test_strong_friction_makes_a_free_device_look_held(monkeypatch, family, best
     assert chosen_of(monkeypatch, "grasped", misfits, found, scores=scores) == (best, tried)
 
 
+@pytest.mark.parametrize(
+    ("name", "rigid", "best"),
+    [
+        ("free", (EXPLAINED, 1.0, 1, 1, 2), "rigid"),
+        ("chain-2", (EXPLAINED, 1.0, 1, 1, 2), "rigid"),
+        ("free", (UNEXPLAINED, 30.0, 1), "free"),  # one mass does not explain it
+    ],
+)
+def test_a_mass_that_runs_away_beside_what_was_found_is_the_ground(
+    monkeypatch, name, rigid, best
+) -> None:
+    """One mass on a spring behind a filter and a lag, which the base models' own fits lack."""
+    found = {
+        name: traced(name, EXPLAINED, 1.0, 1, 2),
+        "rigid": traced("rigid", *rigid),
+    }
+    misfits = {"rigid": 2e5, name: 1.2}
+    assert chosen_of(monkeypatch, name, misfits, found) == (name, [name])
+    found[name].state.fit.run_away = True
+    assert chosen_of(monkeypatch, name, misfits, found) == (best, [name, "rigid"])
+
+
 def test_no_hand_takes_for_its_own_motion_what_a_force_leaves(monkeypatch) -> None:
     """Backlash in a free device: a hand that the response does not show has noise enough."""
     found = {

@@ -26,6 +26,7 @@ from bayeshaptic.report.figures.pictures import PICTURES, draw_pictures
 from bayeshaptic.report.figures.style import Drawn
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.numbers.estimates import least_squares_limit, witnesses
+from bayeshaptic.report.objections import why_none
 from bayeshaptic.report.page.answer import FARED, FARED_HIDDEN
 from bayeshaptic.report.page.frame import template
 from bayeshaptic.report.page.lights import lights
@@ -63,6 +64,19 @@ def test_both_humps_are_named() -> None:
     assert len(analysis.limit.crossings) == 2
     assert "More than one crossing" in hump(analysis)
     assert hump(fake_analysis("rigid")) == ""
+
+
+def test_a_mass_at_a_bound_is_no_reason_to_say_a_delay_that_was_said() -> None:
+    analysis = fake_analysis("free")
+    fit = replace(analysis.fit, outcome={**analysis.fit.outcome, "m2": "at a bound"})
+    told = bayeshaptic.free(device="lhifam")
+    assert "delay_s" in analysis.model.names and "delay_s" not in told.names
+    for model, words in (
+        (told, "say --modes and --held"),
+        (analysis.model, "say the loop's delay"),
+    ):
+        said = " ".join(why_none(FakeAnalysis(**vars(analysis) | {"fit": fit, "model": model})))
+        assert "ends at a bound (m2), where no device is: " in said and words in said
 
 
 def test_no_confident_number_when_the_model_does_not_explain_the_data() -> None:

@@ -102,12 +102,17 @@ def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced
         rivals = doubted or _beside_a_force(begun, own.traced)
     elif own.done and _stands_alone(own.traced, begun, rivals):
         rivals = ()
+    if rivals:
+        loops.take_turns(rivals)
+    best, found, noise = _compared(loops) if rivals else (begun.fit.model.name, {}, 1.0)
+    # With what was found a mass may have run away, which had not in the fit without.
+    simpler = _simpler(begun, loops.running[best].traced.state.fit)
+    if set(simpler) - set(rivals):
+        rivals = tuple(dict.fromkeys((*list(loops.running)[1:], *simpler)))
+        loops.take_turns(rivals)
+        best, found, noise = _compared(loops)
     if not rivals:
         return begun, own.traced
-    loops.take_turns(rivals)
-    found = {name: loop.traced for name, loop in loops.running.items()}
-    noise = max(1.0, min(one.state.fit.reduced_chi_square for one in found.values()))
-    best = _best(found, noise, loops.given_up)
     assert begun.choice is not None
     etfe, fit = base_of(begun, best)
     said = _said(best, found, noise, loops.given_up)
@@ -120,16 +125,16 @@ def _rivals(begun: Begun) -> tuple[str, ...]:
 
     A hand that is like no hand counts as a misfit.  A rigid device with a mode is a free one, and a
     free one with a mode on its body is a chain.  One with a mode on its motor is no chain: so
-    beside a chain that misfits, the free device is tried, too.  A free device of which a mass has
-    run away is one mass with what it lacks: on the spring of a joystick, say, whose other end is no
-    mass but the ground.
+    beside a chain that misfits, the free device is tried, too.  A device of which a mass has run
+    away is one of fewer masses with what it lacks: on the spring of a joystick, say, whose other
+    end is no mass but the ground.
     """
     choice = begun.choice
     if choice is None:
         return ()
     chosen = choice.candidates[begun.fit.model.name]
     like_no_hand = 11.1  # chi-square of five numbers: one hand in twenty
-    simpler = ("rigid",) if begun.fit.model.name == "free" and begun.fit.run_away else ()
+    simpler = _simpler(begun, begun.fit)
     if begun.fit.reduced_chi_square < MISFIT and chosen.from_a_hand < like_no_hand:
         return simpler
     others = {name: one for name, one in choice.candidates.items() if name != "rigid"}
@@ -137,7 +142,14 @@ def _rivals(begun: Begun) -> tuple[str, ...]:
         return tuple(name for name in others if name != "chain-2")
     best = _best_other(choice, chosen)
     beside = ["free"] if begun.fit.model.name == "chain-2" and "free" in others else []
-    return (*simpler, *best, *beside)
+    return tuple(dict.fromkeys((*simpler, *best, *beside)))
+
+
+def _simpler(begun: Begun, fit: Fit) -> tuple[str, ...]:
+    """The base models without a mass that has run away in a fit, as on a spring to the ground."""
+    fewer = {"free": ("rigid",), "chain-2": ("rigid", "free")}
+    known = () if begun.choice is None else begun.choice.candidates
+    return tuple(n for n in fewer.get(fit.model.name, ()) if fit.run_away and n in known)
 
 
 def _best_other(choice: Choice, chosen: ScoredFit) -> tuple[str, ...]:
@@ -208,6 +220,13 @@ def _comparable(
         and (not one.state.fit.model.held or criterion(one, noise) < least)
     }
     return explains or found
+
+
+def _compared(loops: LoopsInTurn) -> tuple[str, Mapping[str, Traced], float]:
+    """The best of the loops, what each of them found, and the noise that they are compared in."""
+    found = {name: loop.traced for name, loop in loops.running.items()}
+    noise = max(1.0, min(one.state.fit.reduced_chi_square for one in found.values()))
+    return _best(found, noise, loops.given_up), found, noise
 
 
 def _best(found: Mapping[str, Traced], noise: float, given_up: Collection[str] = ()) -> str:
