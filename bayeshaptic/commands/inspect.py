@@ -30,6 +30,10 @@ EXAMPLES = """\
   bayeshaptic inspect bench.mat --png bench.png --write study.toml"""
 
 OUTSIDE = " (its recording is outside its folder: report it with --allow-outside, or move one)"
+_JOINED = (
+    "write both into one table, a row for each command, with the position that was read for it "
+    "(by time, if the two have one clock)"
+)
 _BARS = "▁▂▃▄▅▆▇█"
 
 
@@ -113,6 +117,8 @@ def lines(found: Overview) -> list[str]:
         missing = [what for what, any_of in needed.items() if not set(any_of) & set(found.roles)]
         was = "was" if len(missing) == 1 else "were"
         table.append(f"no {' and '.join(missing)} {was} recognised; name them with --columns")
+        if len(missing) == 1:
+            table.append(f"a {missing[0]} that stands in another file: {_JOINED}")
     else:
         period = "" if "time" in found.roles else " --period-s SECONDS"
         table.append(f"--columns {_quoted(printable(found.mapping))}{period}")

@@ -280,9 +280,9 @@ def test_a_speed_alone_is_named_as_one(tmp_path: Path) -> None:
     shown = lines(overview(tmp_path / "b.dat"))
     assert shown[-1] == '--columns "force=torque,velocity=rpm[rpm]" --period-s SECONDS'
     np.savetxt(tmp_path / "c.csv", POSITION, header="angle", comments="")
-    assert "no force was recognised; name them with --columns" in lines(
-        overview(tmp_path / "c.csv")
-    )
+    *_, missing, elsewhere = lines(overview(tmp_path / "c.csv"))
+    assert missing == "no force was recognised; name them with --columns"
+    assert elsewhere.startswith("a force that stands in another file: write both into one table")
 
 
 def test_a_guess_is_called_so_and_a_clock_asked_for(tmp_path: Path) -> None:

@@ -48,6 +48,7 @@ def reader_for(path: Path) -> Reader:
     raise InputError(
         f"{path}: no reader for files ending in '{path.suffix}'; known endings: "
         + " ".join(known_suffixes())
+        + "; write its columns to one of these, a table as .csv"
     )
 
 
