@@ -12,6 +12,7 @@ from bayeshaptic.recordings.checks.sufficiency import FEWEST_SAMPLES, says_nothi
 from bayeshaptic.recordings.checks.two_clocks import two_clocks
 from bayeshaptic.recordings.checks.units_in_doubt import degrees, normalised, whole_numbers
 from bayeshaptic.recordings.checks.what_drives_what import what_drives_what
+from bayeshaptic.recordings.checks.written_digits import written_digits
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -59,6 +60,7 @@ def check_recording(recording: Recording, device: Device | None = None) -> tuple
         *whole_numbers(recording),
         *degrees(recording),
         *normalised(recording),
+        *written_digits(recording),
         *compare_resolution(recording, device),
     )
     rough = rough_response(recording)
