@@ -9,6 +9,7 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -377,6 +378,14 @@ def test_the_next_command_reads_the_file_as_this_one_did() -> None:
     (step,) = next_steps(headline(analysis), analysis, {"options": options})
     said = "--columns 'force=u[N],position=q[mm]' --period-s 0.005 --held no"
     assert step.command.endswith(f"{said} --seed {analysis.posterior.seed + 1}")
+
+
+def test_what_was_taken_for_held_and_has_several_peaks_may_be_held_by_nobody() -> None:
+    analysis = fake_analysis(converged=False)
+    tried = {str(held): SimpleNamespace(held=held) for held in (True, False)}
+    analysis.choice = SimpleNamespace(candidates=tried)
+    (step,) = next_steps(headline(analysis), analysis)
+    assert "nobody holds" in step.text and step.command.endswith("--held no")
 
 
 def test_units_that_nobody_said_are_on_the_first_screen() -> None:
