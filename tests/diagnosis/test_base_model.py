@@ -339,6 +339,14 @@ def test_beside_a_chain_that_misfits_a_mode_may_be_on_the_motor(monkeypatch) -> 
     assert chosen_of(monkeypatch, "chain-2", misfits, found) == ("free", tried)
 
 
+def test_a_chain_that_nothing_is_found_on_does_not_stand_alone(monkeypatch) -> None:
+    """It leaves a little more than noise, and no test says what: the base of a free device."""
+    found = {name: traced(name, EXPLAINED, 1.0, 3) for name in ("grasped", "free")}
+    found["chain-2"] = traced("chain-2", UNEXPLAINED, 1.4)
+    misfits = {"free": 460.0, "chain-2": 1.4, "grasped": 1.4}
+    assert chosen_of(monkeypatch, "chain-2", misfits, found)[0] == "free"
+
+
 def test_hands_are_near_what_hands_are_like() -> None:
     """Draws of a hand are some five squared standard deviations away, a spring to the frame far."""
     rng = np.random.default_rng(5)

@@ -199,7 +199,7 @@ def _stands_alone(own: Traced, begun: Begun, rivals: tuple[str, ...]) -> bool:
     sizes = [begun.choice.candidates[name].fit.model.size for name in rivals if begun.choice]
     simple = own.verdict == EXPLAINED and len(own.state.accepted) == 1
     least = simple and all(begun.fit.model.size < size for size in sizes)
-    return least or not own.state.accepted
+    return least or (own.verdict != UNEXPLAINED and not own.state.accepted)
 
 
 def _comparable(
