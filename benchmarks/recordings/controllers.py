@@ -23,6 +23,7 @@ def steps(samples: int, period: float, rng: np.random.Generator) -> Floats:
 
 
 def low_passed(signal: Floats, pole: float) -> Floats:
+    """A signal behind a low-pass of first order, of gain one at rest."""
     return np.asarray(lfilter([1 - pole], [1, -pole], signal))
 
 

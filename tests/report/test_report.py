@@ -386,6 +386,7 @@ def test_what_was_taken_for_held_and_has_several_peaks_may_be_held_by_nobody() -
     analysis.choice = SimpleNamespace(candidates=tried)
     (step,) = next_steps(headline(analysis), analysis)
     assert "nobody holds" in step.text and step.command.endswith("--held no")
+    assert "--seed" in step.text  # for who does hold it
 
 
 def test_units_that_nobody_said_are_on_the_first_screen() -> None:

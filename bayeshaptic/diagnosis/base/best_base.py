@@ -104,17 +104,18 @@ def traced_from_best_base(begun: Begun, options: Options) -> tuple[Begun, Traced
         rivals = ()
     if rivals:
         loops.take_turns(rivals)
-    best, found, noise = _compared(loops) if rivals else (begun.fit.model.name, {}, 1.0)
+    best = _best_of(loops) if rivals else begun.fit.model.name
     # With what was found a mass may have run away, which had not in the fit without.
     simpler = _simpler(begun, loops.running[best].traced.state.fit)
     if set(simpler) - set(rivals):
         rivals = tuple(dict.fromkeys((*list(loops.running)[1:], *simpler)))
         loops.take_turns(rivals)
-        best, found, noise = _compared(loops)
+        best = _best_of(loops)
     if not rivals:
         return begun, own.traced
     assert begun.choice is not None
     etfe, fit = base_of(begun, best)
+    found, noise = _explanations(loops)
     said = _said(best, found, noise, loops.given_up)
     choice = replace(begun.choice, fit=fit, reason=begun.choice.reason + said)
     return replace(begun, etfe=etfe, fit=fit, choice=choice), found[best]
@@ -222,11 +223,14 @@ def _comparable(
     return explains or found
 
 
-def _compared(loops: LoopsInTurn) -> tuple[str, Mapping[str, Traced], float]:
-    """The best of the loops, what each of them found, and the noise that they are compared in."""
+def _explanations(loops: LoopsInTurn) -> tuple[Mapping[str, Traced], float]:
+    """What each of the loops found, and the noise that they are compared in."""
     found = {name: loop.traced for name, loop in loops.running.items()}
-    noise = max(1.0, min(one.state.fit.reduced_chi_square for one in found.values()))
-    return _best(found, noise, loops.given_up), found, noise
+    return found, max(1.0, min(one.state.fit.reduced_chi_square for one in found.values()))
+
+
+def _best_of(loops: LoopsInTurn) -> str:
+    return _best(*_explanations(loops), loops.given_up)
 
 
 def _best(found: Mapping[str, Traced], noise: float, given_up: Collection[str] = ()) -> str:

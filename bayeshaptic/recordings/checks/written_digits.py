@@ -11,7 +11,9 @@ from bayeshaptic.types import Floats
 
 _FEWEST, _MOST = 3, 7  # significant digits
 _EXACT = 1e-9  # of a number that has no more digits
-_SHARE = 0.02  # of the rows, whose steps are larger than what the device moves in one
+# Of the rows, whose steps are larger than what the device moves in one. How often that is so:
+# docs/door.md.
+_SHARE = 0.02
 
 
 def written_digits(recording: Recording) -> tuple[Notice, ...]:

@@ -149,15 +149,20 @@ def _after_filter(result: Result, command: str, new: str) -> tuple[Step, ...]:
 
 def _after_fit(result: Result, command: str, new: str) -> Step:
     """Where the recording will do, and what came of it will not."""
-    analysis, unheld = result.analysis, f"{command} --held no"
+    analysis = result.analysis
     if not analysis.posterior.converged:
+        seed = f"--seed {analysis.posterior.seed + 1}"
         # A spring to the ground, as of a joystick, may pass for a hand, which leaves more peaks.
         if analysis.model.held and not said_who_holds(analysis):
-            return Step("Say so, if nobody holds the device. This recording will do:", unheld)
+            return Step(
+                "Say so, if nobody holds the device. Else let the sampler begin elsewhere "
+                f"({seed}), and tell it what is known of the device (--device, --delay-s):",
+                f"{command} --held no",
+            )
         return Step(
             "Let the sampler begin elsewhere, and tell it what is known of the device "
             "(--device, --delay-s):",
-            f"{command} --seed {analysis.posterior.seed + 1}",
+            f"{command} {seed}",
         )
     if is_open(analysis):
         return Step(
