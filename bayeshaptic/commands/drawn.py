@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bayeshaptic.devices import Device
+from bayeshaptic.devices.device import Device, kind_of
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.load import load_posterior
 from bayeshaptic.inference.posterior import Posterior
@@ -45,7 +45,7 @@ def drawn_device(path: Path, seed: int, from_prior: bool) -> tuple[Device, str]:
     known = model.device
     device = Device(
         name=known.name if known else path.stem,
-        kind="rotational" if model.position_unit == "rad" else "translational",
+        kind=kind_of(model.position_unit),
         period_s=model.period_s,
         delay_s=delay_s,
         encoder_resolution=known.encoder_resolution if known else None,

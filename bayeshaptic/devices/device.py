@@ -19,6 +19,11 @@ STRUCTURES: dict[str, tuple[str, ...]] = {
 }
 
 
+def kind_of(position_unit: str) -> str:
+    """Which of `KINDS` a device is by the unit of its position, "m" or "rad"."""
+    return KINDS[position_unit == "rad"]
+
+
 @dataclass(frozen=True, repr=False)
 class Device(Shown):
     """A device's facts, from a device file or from the `[device]` table of a study.

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.devices.device import kind_of
 from bayeshaptic.errors import Notice
 from bayeshaptic.quantities import pretty_unit, quantity
 from bayeshaptic.recordings.feedback import Feedback
@@ -16,6 +17,11 @@ from bayeshaptic.shown import Shown
 
 FORCE_UNITS = ("N", "Nm", "A")
 POSITION_UNITS = ("m", "rad")
+
+
+def stiffness_unit_of(force_unit: str, position_unit: str) -> str:
+    """The unit of a force over a position: "N/m", "N m/rad", "A/m" or "A/rad"."""
+    return f"{'N m' if force_unit == 'Nm' else force_unit}/{position_unit}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -88,7 +94,7 @@ class Recording(Shown):
     @property
     def kind(self) -> str:
         """ "translational" or "rotational", by the unit of the position."""
-        return "rotational" if self.position_unit == "rad" else "translational"
+        return kind_of(self.position_unit)
 
     @property
     def samples(self) -> int:
@@ -100,7 +106,7 @@ class Recording(Shown):
 
     @property
     def stiffness_unit(self) -> str:
-        return f"{'N m' if self.force_unit == 'Nm' else self.force_unit}/{self.position_unit}"
+        return stiffness_unit_of(self.force_unit, self.position_unit)
 
     @property
     def pieces(self) -> tuple[Recording, ...]:

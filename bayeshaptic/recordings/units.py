@@ -6,10 +6,9 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 
+from bayeshaptic.devices.device import KINDS, kind_of
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import FORCE_UNITS, POSITION_UNITS
-
-KINDS = ("translational", "rotational")
 
 # unit -> (base unit, factor)
 _TIME = {"s": ("s", 1.0), "ms": ("s", 1e-3), "us": ("s", 1e-6), "ns": ("s", 1e-9)}
@@ -280,7 +279,7 @@ def choose_units(
     if force_unit is None:
         force_unit = "Nm" if position_unit == "rad" else "N"
     refuse_mixed_units(force_unit, position_unit, where)
-    of = KINDS[position_unit == "rad"]
+    of = kind_of(position_unit)
     if kind not in (None, of):
         other = "m" if of == "rotational" else "rad"
         raise InputError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayeshaptic.devices import Device
+from bayeshaptic.devices.device import Device, kind_of
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.checks.against_device import against_response, compare_resolution
 from bayeshaptic.recordings.checks.loop_period import without_doubt
@@ -114,7 +114,7 @@ def _evenly(table: Etfe, clear: Bools) -> RoughResponse:
 
 
 def _refuse_other_kind(position_unit: str, device: Device | None, where: str) -> None:
-    kind = "rotational" if position_unit == "rad" else "translational"
+    kind = kind_of(position_unit)
     if device is not None and device.kind != kind:
         raise InputError(
             f"{where}: a {kind} recording (position in {position_unit}), but "

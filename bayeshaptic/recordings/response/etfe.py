@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayeshaptic.devices.device import kind_of
 from bayeshaptic.errors import Notice
 from bayeshaptic.quantities import interval, pretty_unit, pure
-from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.recording import Recording, stiffness_unit_of
 from bayeshaptic.recordings.response.estimators.direct import DirectSpectra
 from bayeshaptic.recordings.response.estimators.instrument import (
     HIGHEST_THROUGH_REFERENCE,
@@ -137,11 +138,11 @@ class Etfe(Shown):
     @property
     def kind(self) -> str:
         """ "translational" or "rotational", by the unit of the position."""
-        return "rotational" if self.position_unit == "rad" else "translational"
+        return kind_of(self.position_unit)
 
     @property
     def stiffness_unit(self) -> str:
-        return f"{'N m' if self.force_unit == 'Nm' else self.force_unit}/{self.position_unit}"
+        return stiffness_unit_of(self.force_unit, self.position_unit)
 
     @property
     def blurred(self) -> Etfe:
