@@ -9,7 +9,7 @@ from dataclasses import dataclass
 _PREFIXES = {-9: "n", -6: "\N{MICRO SIGN}", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _GRAMS = {-9: "\N{MICRO SIGN}g", -6: "mg", -3: "g", 0: "kg"}
 _PREFIXABLE = ("N", "A", "s", "m", "Hz")
-_NOTHING = "\N{EN DASH}"
+NOTHING = "\N{EN DASH}"  # where there is no number to write
 _LONGEST = 12  # characters of a number: nine digits, a point, a sign and a zero
 _FAR_APART = 1e4  # ends of an interval under one prefix
 
@@ -38,7 +38,7 @@ class Scale:
         ten only where it would be longer than nine digits.
         """
         if value is None or not math.isfinite(value):
-            return _NOTHING
+            return NOTHING
         scaled = value * self.factor
         decimals = _decimals(scaled, None if sd is None else sd * self.factor, digits, least)
         text = f"{round(scaled, decimals) + 0.0:.{max(decimals, 0)}f}"
@@ -93,7 +93,7 @@ def scale(values: float | Iterable[float | None], unit: str) -> Scale:
 def quantity(value: float | None, unit: str, sd: float | None = None, digits: int = 3) -> str:
     """A number with its unit, for example ``"22.1 kN/m"``; a dash for a missing one."""
     if value is None or not math.isfinite(value):
-        return _NOTHING
+        return NOTHING
     return scale(value, unit).quantity(value, sd, digits)
 
 
@@ -103,7 +103,7 @@ def interval(low: float | None, high: float | None, unit: str, sd: float | None 
     Ends that are decades apart have a prefix each.
     """
     if low is None or high is None or not (math.isfinite(low) and math.isfinite(high)):
-        return _NOTHING
+        return NOTHING
     if _far_apart(low, high):
         return f"{quantity(low, unit, digits=2)} to {quantity(high, unit, digits=2)}"
     row = scale((low, high), unit)
@@ -181,7 +181,7 @@ def rounded_down(
 def pure(value: float, digits: int = 3) -> str:
     """A number without a unit and without powers of ten: ``"10,400"``, ``"0.957"``."""
     if not math.isfinite(value):
-        return _NOTHING
+        return NOTHING
     return minus(f"{float(f'{value:.{digits}g}'):,.10g}")
 
 

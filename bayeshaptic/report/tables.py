@@ -9,6 +9,7 @@ import numpy as np
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.quantities import (
+    NOTHING,
     interval,
     minus,
     percent,
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from bayeshaptic.models.prior import Prior
     from bayeshaptic.stability.critical import CriticalStiffness
 
-_DASH = "\N{EN DASH}"
 _OUTCOMES = {
     "at a bound": "least squares stopped at its bound",
     "prior-dominated": "the data alone do not decide it",
@@ -75,7 +75,7 @@ def _shrinkage(prior: Prior, low: float, high: float) -> str:
     """The width of the 90 % interval over that of the prior."""
     wide = float(np.diff(prior.quantile(np.array([0.05, 0.95])))[0])
     if not (np.isfinite(wide) and wide > 0):
-        return _DASH
+        return NOTHING
     share = 100 * (high - low) / wide
     if share > 100:
         return "over 100 %"
@@ -114,7 +114,7 @@ def safe(analysis: Analysis) -> Rows:
     for risk in RISKS:
         found = limit.safe(risk)
         if found is None:
-            row = ["too few draws to say", _DASH, _DASH]
+            row = ["too few draws to say", NOTHING, NOTHING]
         else:
             stated = rounded_down(found, limit.unit, *ends)
             row = [stated.text, _db(stated.value)]
@@ -145,8 +145,8 @@ def comparison(result: Result) -> Rows:
         ends = (witness.low, witness.high)
         spread = ours_spread if None in ends else spread_of(*ends)  # type: ignore[arg-type]
         numbers = _scaled([witness.low, middle, witness.high], analysis.limit.unit, spread)
-        level = _DASH if not middle else f"{decibel(middle):.2f}"
-        apart = _DASH
+        level = NOTHING if not middle else f"{decibel(middle):.2f}"
+        apart = NOTHING
         if middle and np.isfinite(ours) and witness.key != "posterior":
             difference = round(decibel(middle) - ours, 2) + 0.0  # no minus before a zero
             apart = minus(f"{difference:+.2f}")
@@ -215,11 +215,11 @@ def _scaled(
     if spread is None and known:
         spread = spread_of(min(known), max(known))
     return tuple(
-        _DASH if v is None else "no limit" if v == np.inf else row.quantity(v, spread)
+        NOTHING if v is None else "no limit" if v == np.inf else row.quantity(v, spread)
         for v in values
     )
 
 
 def _db(stiffness: float) -> str:
     level = decibel(stiffness)
-    return f"{level:.2f} dB" if np.isfinite(level) else _DASH
+    return f"{level:.2f} dB" if np.isfinite(level) else NOTHING

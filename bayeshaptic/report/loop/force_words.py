@@ -9,7 +9,7 @@ import numpy as np
 from bayeshaptic.diagnosis.feedback.tones_in_motion import tones_of
 from bayeshaptic.diagnosis.samples.sinusoids import in_words
 from bayeshaptic.inference.time_domain.mass_in_loop import NAMES
-from bayeshaptic.quantities import pure, quantity, scale
+from bayeshaptic.quantities import NOTHING, pure, quantity, scale
 from bayeshaptic.report.loop.motion_words import motion_words
 
 if TYPE_CHECKING:
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.feedback.explain import ForceExplained
     from bayeshaptic.diagnosis.feedback.inverse_dynamics import InverseDynamics
     from bayeshaptic.report.numbers.rows import Rows
-
-_DASH = "\N{EN DASH}"
 
 
 def found(force: ForceExplained, unit: str, response: str) -> str:
@@ -95,7 +93,7 @@ def coefficients(force: ForceExplained) -> Rows:
         (
             term.title,
             *(
-                _value(one, term.name, term.unit) if term.name in titles(one) else _DASH
+                _value(one, term.name, term.unit) if term.name in titles(one) else NOTHING
                 for one in columns
             ),
         )

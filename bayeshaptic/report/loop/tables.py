@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.diagnosis.residuals.ripples import WAVES
 from bayeshaptic.effects.library import effect_class
-from bayeshaptic.quantities import estimate, minus, percent, quantity, scale
+from bayeshaptic.quantities import NOTHING, estimate, minus, percent, quantity, scale
 from bayeshaptic.report.loop.change_words import part
 from bayeshaptic.report.loop.words import parameter_words, shown_estimates
 from bayeshaptic.report.numbers.rows import ParameterRow, Rows
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.residuals.residual import Test
     from bayeshaptic.diagnosis.state import Accepted
 
-_DASH = "\N{EN DASH}"
 _SHOWN = 8
 _CHANCE = ", \N{MINUS SIGN}log10 of its chance"
 # Of tests whose statistic is no number of standard deviations.
@@ -110,7 +109,7 @@ def candidates(closed: Closed) -> Rows:
             score = _score(candidate.score)
             if candidate.accepted and number == 0:
                 mended = "mended" if effect_class(candidate.name).mended else "taken for noise"
-                score, fate = _DASH, f"seen in the samples, and {mended} before the first round"
+                score, fate = NOTHING, f"seen in the samples, and {mended} before the first round"
             rows.append((str(number), candidate.title, score, fate))
     return tuple(rows)
 
@@ -170,7 +169,7 @@ def errors(closed: Closed) -> Rows:
     def limits(e: Mapping[str, Any]) -> str:
         q = e["critical_stiffness"]
         if q is None or not all(math.isfinite(value) for value in q.values()):
-            return _DASH
+            return NOTHING
         return estimate(q["q50"], q["q05"], q["q95"], unit)
 
     rows = (
@@ -181,7 +180,7 @@ def errors(closed: Closed) -> Rows:
         ("critical stiffness, median (90 %)", *map(limits, columns)),
         row("median, model minus the measurement's own", "critical_stiffness_db", " dB", 2),
     )
-    return tuple(row for row in rows if set(row[1:]) != {_DASH})
+    return tuple(row for row in rows if set(row[1:]) != {NOTHING})
 
 
 def estimates(closed: Closed) -> tuple[ParameterRow, ...]:
@@ -198,12 +197,12 @@ def estimates(closed: Closed) -> tuple[ParameterRow, ...]:
                     said.partition(",")[0],
                     said if "," in said else effect.title,
                     row.unit,
-                    _DASH,
+                    NOTHING,
                     row.with_error(value["mean"], sd),
-                    spread if sd else _DASH,
-                    _DASH,
-                    _DASH,
-                    _DASH,
+                    spread if sd else NOTHING,
+                    NOTHING,
+                    NOTHING,
+                    NOTHING,
                     "estimated beside the posterior",
                 )
             )
@@ -223,7 +222,7 @@ def _parameters(closed: Closed, effect: Accepted, known: Mapping[str, Any]) -> R
         )
         middle = f"{row.with_error(value['mean'], sd)} {row.unit}".rstrip()
         ends = f"{row.number(value['q05'], sd)} to {row.number(value['q95'], sd)} {row.unit}"
-        rows.append((title, middle, ends.rstrip() if sd else _DASH))
+        rows.append((title, middle, ends.rstrip() if sd else NOTHING))
     return tuple(rows)
 
 
@@ -233,7 +232,7 @@ def _sentence(text: str) -> str:
 
 def _outcome(test: Test | None) -> tuple[str, str]:
     if test is None:
-        return _DASH, _DASH
+        return NOTHING, NOTHING
     flag = ", beyond" if test.flagged else ""
     return f"{_score(test.statistic)}{flag}", _score(test.threshold)
 
@@ -241,7 +240,7 @@ def _outcome(test: Test | None) -> tuple[str, str]:
 def _score(value: float) -> str:
     """One decimal where the number is small, none where it is large."""
     if not math.isfinite(value):
-        return _DASH
+        return NOTHING
     text = f"{round(value, 1) + 0.0:,.1f}" if abs(value) < 99.95 else f"{value:,.0f}"
     return minus(text)
 
@@ -249,7 +248,7 @@ def _score(value: float) -> str:
 def _number(value: float | None, suffix: str, places: int | None = None) -> str:
     """Three digits, or so many decimal places, with what stands behind them."""
     if value is None or not math.isfinite(value):
-        return _DASH
+        return NOTHING
     if places is None:
         return quantity(value, "") + suffix
     return minus(f"{round(value, places) + 0.0:.{places}f}") + suffix

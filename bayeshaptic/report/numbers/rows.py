@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.quantities import Scale, scale
+from bayeshaptic.quantities import NOTHING, Scale, scale
 
 Rows = tuple[tuple[str, ...], ...]
-_DASH = "\N{EN DASH}"
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,7 @@ class ParameterRow:
     ess: str
     rhat: str
     remarks: str
-    shrinkage: str = _DASH
+    shrinkage: str = NOTHING
 
 
 def scale_of(draws: NDArray[Any], unit: str) -> Scale:

@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bayeshaptic.quantities import Rounded, interval, percent, pure, quantity, rounded_down, scale
+from bayeshaptic.quantities import (
+    NOTHING,
+    Rounded,
+    interval,
+    percent,
+    pure,
+    quantity,
+    rounded_down,
+    scale,
+)
 from bayeshaptic.report.numbers.cases import has_draws, held_cases, raw_limits
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel
 from bayeshaptic.report.numbers.hidden import amount
@@ -24,7 +33,6 @@ if TYPE_CHECKING:
     from bayeshaptic.study.analysed import Analysed
     from bayeshaptic.study.analysis import StudyAnalysis
 
-_DASH = "\N{EN DASH}"
 _LEVELS = tuple(QUANTILES.values())
 _MOST_CASES = 8
 
@@ -66,7 +74,7 @@ def hidden(study: StudyAnalysis) -> Rows:
             one.title,
             percent(one.prior),
             _between(one.alone),
-            _DASH if one.together is None else percent(one.together),
+            NOTHING if one.together is None else percent(one.together),
             amount(one.strength_q95[0], one.unit),
             amount(one.strength_q95[1], one.unit),
             one.what,
@@ -103,7 +111,7 @@ def _recording(one: Analysed) -> tuple[str, ...]:
         "" if entry.configuration is None else str(entry.configuration),
         ", ".join(parts),
         analysis.model.name,
-        ", ".join(title_of(effect) for effect in one.effects) or _DASH,
+        ", ".join(title_of(effect) for effect in one.effects) or NOTHING,
         f"{decibel(middle):.2f}",
         interval(low, high, analysis.limit.unit),
     )
@@ -118,7 +126,7 @@ def safe(study: StudyAnalysis) -> Rows:
     for risk in RISKS:
         found = [_stated(limit, risk) for limit in limits]
         value = 0.0 if found[0] is None else found[0].value
-        level = f"{decibel(value):.2f}" if 0 < value < np.inf else _DASH
+        level = f"{decibel(value):.2f}" if 0 < value < np.inf else NOTHING
         texts = ["not stated" if one is None else one.text for one in found]
         rows.append((percent(risk), texts[0], level, *texts[1:]))
     return tuple(rows)
@@ -185,14 +193,14 @@ def users(study: StudyAnalysis) -> Rows:
         inside = case in study.users
         own = alone.get(case.label, ()) if inside else (case.limit,)
         why = "too few draws to say" if inside else "not in the population"
-        given: tuple[str, ...] = (why, _DASH, _DASH, _DASH)
+        given: tuple[str, ...] = (why, NOTHING, NOTHING, NOTHING)
         if inside and has_draws(case):
             given = (
                 *(f"{decibel(case.limit.quantile(p)):.2f}" for p in (0.5, 0.05, 0.95)),
                 pure(spread_db(case), 2),
             )
         middles = ", ".join(f"{decibel(one.quantile(0.5)):.2f}" for one in own)
-        rows.append((case.label.removeprefix("user "), middles or _DASH, *given))
+        rows.append((case.label.removeprefix("user "), middles or NOTHING, *given))
     return tuple(rows)
 
 

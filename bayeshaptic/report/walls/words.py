@@ -6,7 +6,16 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from bayeshaptic.quantities import Scale, percent, percents, pure, quantity, rounded_down, scale
+from bayeshaptic.quantities import (
+    NOTHING,
+    Scale,
+    percent,
+    percents,
+    pure,
+    quantity,
+    rounded_down,
+    scale,
+)
 from bayeshaptic.report.listed import listed
 from bayeshaptic.stability.tail import quantiles
 
@@ -16,7 +25,6 @@ if TYPE_CHECKING:
     from bayeshaptic.stability.walls.limit_table import LimitTable
     from bayeshaptic.stability.walls.width import ZWidth
 
-_DASH = "\N{EN DASH}"
 _TOLD = (0.01, 0.05)  # the first of these risks that the draws can state
 _DAMPING = (
     "Damping B acts on a velocity that the controller makes from the positions it reads. Up to a "
@@ -66,7 +74,7 @@ def width_rows(table: LimitTable) -> tuple[tuple[str, ...], ...]:
         for risk, undamped in zip(table.risks, table.stiffness, strict=True):
             width = part.width(risk)
             why = "too few draws to say" if undamped is None else "too few draws over damping"
-            row: tuple[str, ...] = (why, *(3 * (_DASH,)))
+            row: tuple[str, ...] = (why, *(3 * (NOTHING,)))
             if width is not None:
                 row = (
                     quantity(width.stiffness, table.unit),
