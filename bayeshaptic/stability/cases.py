@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from bayeshaptic.arguments import at_the_door, instance
 from bayeshaptic.errors import InputError
@@ -16,7 +14,8 @@ from bayeshaptic.numerics.effective_draws import effective_draws
 from bayeshaptic.shown import Shown
 from bayeshaptic.stability.critical import CriticalStiffness
 from bayeshaptic.stability.draws import MOST_DRAWS
-from bayeshaptic.stability.tail import low_quantile, quantiles
+from bayeshaptic.stability.limit_draws import LimitDraws
+from bayeshaptic.stability.tail import low_quantile
 from bayeshaptic.types import Floats, Ints
 
 GROUPS = FREE, HELD, NEW_PERSON, CONFIGURATION = "free", "held", "new person", "configuration"
@@ -91,7 +90,7 @@ class Binding:
 
 
 @dataclass(frozen=True, eq=False)
-class DeviceLimit:
+class DeviceLimit(LimitDraws):
     """The critical stiffness over all cases of a device: in each joint draw, the smallest.
 
     Attributes
@@ -124,28 +123,6 @@ class DeviceLimit:
         for binding in self.binding:
             shares[binding.group] = shares.get(binding.group, 0.0) + binding.probability
         return shares
-
-    def quantile(self, p: ArrayLike) -> Any:
-        """The stiffness, in `unit`, that the limit is below with probability `p` (0 to 1).
-
-        A float, or an array of the shape of `p`.
-        """
-        levels = np.asarray(p, float)
-        found = quantiles(self.samples, levels)
-        return float(found) if levels.ndim == 0 else found
-
-    def db(self, p: ArrayLike = 0.5) -> Any:
-        """`quantile` of `p` in decibels, 20 log10 of the number in `unit`."""
-        with np.errstate(divide="ignore"):
-            return 20 * np.log10(self.quantile(p))
-
-    def probability_unstable(self, stiffness: ArrayLike) -> Any:
-        """The share of draws whose limit is below a stiffness: P(limit < stiffness).
-
-        A float, or an array of the shape of `stiffness`, which is in `unit`.
-        """
-        below = np.searchsorted(np.sort(self.samples), stiffness, side="left")
-        return below / len(self.samples)
 
     def safe(self, risk: float) -> float | None:
         """The stiffness that is unstable in some case with probability `risk`.

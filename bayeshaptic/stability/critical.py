@@ -19,14 +19,15 @@ from bayeshaptic.stability.binding import BindingCrossing, group_crossings
 from bayeshaptic.stability.crossings import rational
 from bayeshaptic.stability.draws import opened, vectors_of
 from bayeshaptic.stability.each_draw import limits_of
+from bayeshaptic.stability.limit_draws import LimitDraws
 from bayeshaptic.stability.spectral_radius import confirms
-from bayeshaptic.stability.tail import LowQuantile, low_quantile, quantiles
+from bayeshaptic.stability.tail import LowQuantile, low_quantile
 from bayeshaptic.threads import single_threaded
 from bayeshaptic.types import Floats, Ints
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CriticalStiffness(Shown):
+class CriticalStiffness(LimitDraws, Shown):
     """K_CR of each draw of a posterior, or of one model.
 
     Attributes
@@ -76,25 +77,6 @@ class CriticalStiffness(Shown):
         """Effective number of draws of K_CR (of its ranks), each walker a chain."""
         ranks = np.unique(self.samples, return_inverse=True)[1]
         return effective_draws(ranks.reshape(self.chains, -1))
-
-    @at_the_door
-    def quantile(self, p: ArrayLike) -> Any:
-        """The stiffness that K_CR is below with probability `p`; a float, or an array as `p`."""
-        levels = np.asarray(p, float)
-        found = quantiles(self._ordered, levels)
-        return float(found) if levels.ndim == 0 else found
-
-    @at_the_door
-    def db(self, p: ArrayLike = 0.5) -> Any:
-        """`quantile` of `p` in decibels, 20 log10 of the number in `unit`."""
-        with np.errstate(divide="ignore"):
-            return 20 * np.log10(self.quantile(p))
-
-    @at_the_door
-    def probability_unstable(self, stiffness: ArrayLike) -> Any:
-        """P(K_CR < stiffness), the share of draws below it; a float, or an array as `stiffness`."""
-        below = np.searchsorted(self._ordered, stiffness, side="left")
-        return below / len(self.samples)
 
     @at_the_door
     def safe(self, risk: float) -> float | None:
@@ -163,11 +145,6 @@ class CriticalStiffness(Shown):
             }
             for i in range(len(self.samples))
         )
-
-    # A page asks for the same few numbers some fifty times.
-    @cached_property
-    def _ordered(self) -> Floats:
-        return np.sort(self.samples)
 
     @cached_property
     def _low_quantiles(self) -> dict[float, LowQuantile | None]:
