@@ -9,6 +9,11 @@ from bayeshaptic.models.hand import from_a_hand
 from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.types import Floats
 
+# Differences of BIC, or of twice the log likelihood: evidence "not worth more than a bare
+# mention", and "very strong" evidence
+# (R. E. Kass and A. E. Raftery, JASA 90, 1995).
+BARE_MENTION, VERY_STRONG = 2.0, 10.0
+
 
 def information_criterion(fit: Fit, noise: float, further: int = 0) -> float:
     """Bayesian information criterion of a fit; smaller is better.

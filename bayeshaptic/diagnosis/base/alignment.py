@@ -10,7 +10,7 @@ import numpy as np
 from bayeshaptic.diagnosis.base.opened import Opened, opened
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.errors import InputError, Notice
-from bayeshaptic.inference.criterion import deviance, information_criterion
+from bayeshaptic.inference.criterion import VERY_STRONG, deviance, information_criterion
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.likelihood import Likelihood
@@ -30,7 +30,6 @@ MOVED, LESS_DELAY = "rows moved", "less delay"  # topics of notices
 # two commands lead by half a period.  That of three filters, too, and leaves so little of what a
 # simpler model misfits by.  How often either is seen, and where it is not there: docs/door.md.
 LESS, _REST = 0.25, 0.1
-_SURELY = 10.0  # of twice the log likelihood; "very strong" evidence (Kass and Raftery, 1995)
 # The reduced chi-square must fall to this share; rows of one sample hardly change it. How many of
 # those are moved nevertheless: docs/door.md.
 _FALLS = 0.9
@@ -265,7 +264,7 @@ def _needs_less(best: Fit, other: Fit, fit: Fit) -> bool:
         return rest < _REST or not best.misfits
     gain = deviance(other, noise=1.0)[0] - deviance(best, noise=1.0)[0]
     better = information_criterion(best, noise=1.0) < information_criterion(fit, noise=1.0)
-    return gain > _SURELY and better
+    return gain > VERY_STRONG and better
 
 
 def _falls(after: Fit, before: Fit) -> bool:

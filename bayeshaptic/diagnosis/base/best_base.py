@@ -19,15 +19,12 @@ from bayeshaptic.diagnosis.base.loops_in_turn import LoopsInTurn, parameters_of
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.inference.choose import Choice, ScoredFit
-from bayeshaptic.inference.criterion import information_criterion
+from bayeshaptic.inference.criterion import BARE_MENTION, VERY_STRONG, information_criterion
 from bayeshaptic.inference.fit import MISFIT, Fit
 from bayeshaptic.inference.loop_response import as_of_the_loop, hardly_differ
 from bayeshaptic.models import Model
 from bayeshaptic.numerics.spending import RATE, counting, metered
 
-# Differences of BIC: evidence "not worth more than a bare mention", and "very strong" evidence
-# (R. E. Kass and A. E. Raftery, JASA 90, 1995).
-_BARE_MENTION, _VERY_STRONG = 2.0, 10.0
 _SEVERAL = 2  # linear effects: one is no sign that rows are not of one sample
 _MOST_AGAIN = 2  # times that the loop is closed again
 _OWN = 0.6  # of the budget for the base model that was chosen, where others are in question
@@ -189,7 +186,7 @@ def _hardly_worse(begun: Begun) -> tuple[str, ...]:
     return tuple(
         name
         for name, other in choice.candidates.items()
-        if other.held != chosen.held and other.score - chosen.score < _VERY_STRONG
+        if other.held != chosen.held and other.score - chosen.score < VERY_STRONG
     )
 
 
@@ -241,7 +238,7 @@ def _best(found: Mapping[str, Traced], noise: float, given_up: Collection[str] =
     """
     among = _comparable(found, noise, given_up)
     behind = {name: criterion(traced, noise) for name, traced in among.items()}
-    equals = [name for name in behind if behind[name] <= min(behind.values()) + _BARE_MENTION]
+    equals = [name for name in behind if behind[name] <= min(behind.values()) + BARE_MENTION]
     return min(equals, key=lambda name: (parameters_of(found[name].state), behind[name]))
 
 

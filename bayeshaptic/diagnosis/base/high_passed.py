@@ -18,7 +18,7 @@ import numpy as np
 from bayeshaptic.diagnosis.residuals.moved import left_of_position
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.choose import Choice
-from bayeshaptic.inference.criterion import information_criterion
+from bayeshaptic.inference.criterion import VERY_STRONG, information_criterion
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import LinearSystem, LogNormal, Model, Parameter
@@ -35,7 +35,6 @@ _CORNER = "high_pass_hz"
 # Of the position, by rms: 35 high-passed ones leave 0.003 to 0.058 of themselves; of five held ones
 # that looked filtered by their response, and were not, four leave 0.14 to 0.6 (docs/door.md).
 _LITTLE, _HALF = 0.1, 0.5
-_SURELY = 10.0  # "very strong" evidence (R. E. Kass and A. E. Raftery, JASA 90, 1995)
 _ROUNDED = 1e-3  # of a power of ten, as a logarithm
 _LOG_SD = 1.5  # of the corner, around the lower end of the band: it only bounds the search
 
@@ -131,7 +130,7 @@ def _explains_more(filtered: Fit, fit: Fit, recording: Recording) -> bool:
     if 2 * np.pi * _corner_hz(filtered) * recording.duration_s < 1:
         return False  # in so long a time it does nothing
     gain = _score(fit) - _score(filtered)
-    if filtered.model.name == fit.model.name and gain > _SURELY:
+    if filtered.model.name == fit.model.name and gain > VERY_STRONG:
         return True
     left = left_of_position(filtered, recording)
     return left < _LITTLE and (gain > 0 or left < _HALF * left_of_position(fit, recording))

@@ -9,9 +9,8 @@ from functools import lru_cache
 import numpy as np
 
 from bayeshaptic.diagnosis.periodic.joint import Basis
-from bayeshaptic.diagnosis.periodic.steady_motion import LOAD
 from bayeshaptic.effects.laws import fitted
-from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, MOTOR, Place
+from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR, Place
 from bayeshaptic.effects.nonlinear.protocol import Motion
 from bayeshaptic.effects.nonlinear.shapes import VELOCITY, Shape, Usual
 from bayeshaptic.models import Model

@@ -23,7 +23,6 @@ from bayeshaptic.numerics.polynomials.polynomial import evaluate
 from bayeshaptic.numerics.spending import spend
 from bayeshaptic.types import Complexes, Floats
 
-LOAD = Place(1, None)
 # What it costs to set one up and evaluate it some times, a sample of a period, in values of a
 # rational model.
 _COST = 25.0

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.ripples import (
     WAVES,
     Ripple,
@@ -32,8 +33,6 @@ from bayeshaptic.types import Floats
 
 _SIZE = 3  # parameters: the period, and both parts of the ripple
 _MOST = 0.9  # of the mean gain that a ripple may be
-_FARTHEST = 2.3  # log stiffness: a factor of ten
-_LAW_SD = 0.03  # relative, of a ripple's size: no motor's is one sine
 
 
 def ripple_trials(state: State, raised: set[str], meter: Meter) -> list[Trial]:
@@ -101,8 +100,8 @@ def _given(state: State, recording: Recording, wave: Wave, ripple: Ripple) -> Fl
 
 
 def _log_sd(ripple: Ripple) -> float:
-    """Of log K_CR, as the largest gain is known."""
-    return float(np.hypot(ripple.sd, _LAW_SD * ripple.size)) / (1 + ripple.size)
+    """Of log K_CR, as the largest gain is known: no motor's ripple is one sine."""
+    return float(np.hypot(ripple.sd, thresholds.LAW_SD * ripple.size)) / (1 + ripple.size)
 
 
 def _lowered(state: State, ripple: Ripple) -> float:
@@ -115,4 +114,4 @@ def _lowered(state: State, ripple: Ripple) -> float:
     theta = np.array([values[name] for name in stiffer.names])
     limits = (critical_stiffness(model, state.fit.theta), critical_stiffness(stiffer, theta))
     here, there = (max(float(limit.value), 1e-300) for limit in limits)
-    return float(np.clip(np.log(here / there), 0.0, _FARTHEST))
+    return float(np.clip(np.log(here / there), 0.0, thresholds.FARTHEST))

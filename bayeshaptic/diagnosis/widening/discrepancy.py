@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.excess import changing_share, noise_besides
 from bayeshaptic.diagnosis.traced import UNEXPLAINED, Traced, share_left
 from bayeshaptic.diagnosis.widening.deviation import Deviation, deviation, evidence, matern, merged
@@ -27,7 +28,6 @@ from bayeshaptic.stability.binding import as_known, binding_kinds, group_crossin
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.types import Complexes, Floats
 
-_FARTHEST = 2.3  # log stiffness that a rest may take a limit: a factor of ten
 _LEAST = {"nonlinear": 0.12, "time-varying": 0.12, "measurement": 0.03}
 
 
@@ -155,12 +155,12 @@ def _rest(base: Fit, traced: Traced, family: str) -> float:
     """
     fit = traced.state.fit
     if family == "nonlinear" and traced.state.etfe.direct:
-        return min(forces_left(fit, traced.after).limit_log, _FARTHEST)
+        return min(forces_left(fit, traced.after).limit_log, thresholds.FARTHEST)
     if family == "nonlinear":
         base = traced.without_forces or base
     limits = [critical_stiffness(one.model, one.theta).value for one in (base, fit)]
     moved = abs(float(np.log(max(limits[0], 1e-9) / max(limits[1], 1e-9))))
-    return share_left(traced, family) * min(moved, _FARTHEST)
+    return share_left(traced, family) * min(moved, thresholds.FARTHEST)
 
 
 def _downwards(traced: Traced, family: str) -> float:

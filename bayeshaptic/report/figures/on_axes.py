@@ -11,11 +11,10 @@ from bayeshaptic.report.figures import style
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_WIDTH_IN = 7.4
 _NARROW_IN = 4.5  # axes less wide have no room for a legend or numbers beside them
 
 
-def axes_of(ax: Axes | None, height_in: float, width_in: float = _WIDTH_IN) -> Axes:
+def axes_of(ax: Axes | None, height_in: float, width_in: float = style.WIDTH_IN) -> Axes:
     """The axes that were given, or those of a new figure; an InputError where they are none."""
     if ax is not None:
         if not hasattr(ax, "transAxes"):
@@ -77,5 +76,5 @@ def stacked(
     import matplotlib.pyplot as plt
 
     options: dict[str, Any] = {"sharex": True, "height_ratios": heights, "layout": "constrained"}
-    size = (_WIDTH_IN, sum(heights))
+    size = (style.WIDTH_IN, sum(heights))
     return list(plt.subplots(len(heights), 1, figsize=size, **options)[1])
