@@ -21,7 +21,6 @@ PHANTOM = ("phantom", "free")
 USERS = ("phantom", "grasped")
 HAND = ("bs", "ks", "mh", "bh", "kh")
 GRIP = (*HAND, "b1", "m2")  # these, too, are others in Table I with a hand than without
-SPREADS = (0.05, 0.15, 0.30)
 SPREAD = 0.15
 GAIN_SD_DB = 0.2
 TRIAL_SD_DB = 0.3  # PHANToM free: one trial's error

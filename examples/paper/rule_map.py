@@ -13,7 +13,7 @@ from bayeshaptic.stability import find_crossings, rigid_limit
 from bayeshaptic.stability.binding import MODE, binding_kinds
 from bayeshaptic.types import Floats
 
-from .published import TABLES, delay_s, values
+from .published import delay_s, values
 
 PERIOD_S = 1e-3
 MODE_HZ = np.geomspace(20.0, 300.0, 61)
@@ -87,11 +87,3 @@ def jump(pretension: RuleMap) -> float:
     on_mode = pretension.on_mode[row]
     edges = np.flatnonzero(np.diff(on_mode.astype(int)))
     return float(np.sqrt(pretension.x[edges[0]] * pretension.x[edges[0] + 1]))
-
-
-def good_share(of: RuleMap) -> float:
-    """Share of a map where the rule is within GOOD_DB."""
-    return float(np.mean(np.abs(of.error_db) < GOOD_DB))
-
-
-FIRST_MODES = {device: TABLES[device]["first_mode_hz"] for device in ("phantom", "lhifam")}

@@ -10,11 +10,9 @@ from bayeshaptic.numerics.polynomials.partial_fractions import moved_apart, resi
 from bayeshaptic.types import Complexes, Floats
 
 
-def linear_motion(
-    system: LinearSystem, force: Floats, period_s: float, mass: int = 0, substeps: int = 1
-) -> Floats:
-    """Position and velocity of one mass, shape (2, N * substeps): see `linear_motions`."""
-    return linear_motions(system, force, period_s, (mass,), substeps)[0]
+def linear_motion(system: LinearSystem, force: Floats, period_s: float) -> Floats:
+    """Position and velocity of the motor at the samples, shape (2, N): see `linear_motions`."""
+    return linear_motions(system, force, period_s, (0,))[0]
 
 
 def linear_motions(

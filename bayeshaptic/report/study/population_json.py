@@ -12,6 +12,7 @@ from bayeshaptic.inference.population.reweighting import ALONE
 from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS
 from bayeshaptic.report.study.headline import study_headline
 from bayeshaptic.report.summary import plain, recommendation
+from bayeshaptic.stability.tail import quantiles
 from bayeshaptic.types import Floats
 
 if TYPE_CHECKING:
@@ -178,6 +179,5 @@ def _together(cases: Sequence[Case]) -> dict[str, Any]:
 
 
 def _quantiles(samples: Floats) -> dict[str, Any]:
-    method = "linear" if np.isfinite(samples).all() else "inverted_cdf"
-    values = np.quantile(samples, list(QUANTILES.values()), method=method)  # type: ignore[call-overload]
+    values = quantiles(samples, list(QUANTILES.values()))
     return dict(zip(QUANTILES, values.tolist(), strict=True))
