@@ -85,9 +85,7 @@ LAW_SD = 0.03
 
 Chosen.  With it all 19 intervals (90 %) that 40 rubbing loops got hold the limit."""
 FARTHEST = 2.3
-"""Log stiffness that what is left, or a ripple, may move a limit by: a factor of ten.
-
-Chosen: beyond it no number is to be had."""
+"""Log stiffness that what is left, or a ripple, may move a limit by at most: a factor of ten."""
 LAW_REST = 3.0
 """What one law of a force may leave more than another by chance, in thresholds.
 
