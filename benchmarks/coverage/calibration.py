@@ -281,6 +281,11 @@ def uniform(ranks: np.ndarray) -> float:
     return float(kstest(ranks, "uniform").pvalue)
 
 
+def pooled(outcomes: list[Outcome], field: str) -> np.ndarray:
+    """A column of all parameters with more data than prior."""
+    return np.concatenate([getattr(o, field)[~o.dominated] for o in outcomes])
+
+
 def combined(probabilities: np.ndarray) -> float:
     """One probability of several dependent tests, by Cauchy's distribution.
 

@@ -17,12 +17,15 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import numpy as np  # noqa: E402
 
-from benchmarks.coverage.calibration import CASES, Outcome, Setting, calibrate, combined, uniform  # noqa: E402
-
-
-def pooled(outcomes: list[Outcome], field: str) -> np.ndarray:
-    """A column of all parameters with more data than prior."""
-    return np.concatenate([getattr(o, field)[~o.dominated] for o in outcomes])
+from benchmarks.coverage.calibration import (  # noqa: E402
+    CASES,
+    Outcome,
+    Setting,
+    calibrate,
+    combined,
+    pooled,
+    uniform,
+)
 
 
 def row(name: str, outcomes: list[Outcome]) -> str:

@@ -15,7 +15,7 @@ import json
 import time
 import traceback
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +29,6 @@ from benchmarks.strangers.draw import Case
 from benchmarks.strangers.recordings import make
 
 Row = dict[str, Any]
-
-
-def one(seed: int) -> dict[str, Any]:
-    """What became of the recording of a seed."""
-    return {"seed": seed} | analysed(make(seed))
 
 
 def analysed(case: Case | None) -> dict[str, Any]:
@@ -153,9 +148,15 @@ def summary(rows: list[dict[str, Any]]) -> None:
     print(f"defects: {defects or 'none'}; warnings: {[r['seed'] for r in rows if r['warned']]}")
 
 
-def kept(seeds: Sequence[int], path: Path | None, found: Callable[[int], Row]) -> None:
-    """What becomes of each seed, a line each, then the table; `path` keeps what is done."""
+def run(what: str | None, made: Callable[[int], Case | None]) -> None:
+    """What becomes of the recordings that are made of as many seeds as the command line says."""
+    kept(parser_of(what).parse_args(), lambda seed: {"seed": seed} | analysed(made(seed)))
+
+
+def kept(asked: argparse.Namespace, found: Callable[[int], Row]) -> None:
+    """What becomes of each seed, a line each, then the table; the file keeps what is done."""
     rows: dict[int, Row] = {}
+    seeds, path = range(asked.first, asked.first + asked.count), asked.file
     if path and path.exists():
         rows = {row["seed"]: row for row in map(json.loads, path.read_text().splitlines())}
     for seed in seeds:
@@ -177,10 +178,5 @@ def parser_of(what: str | None) -> argparse.ArgumentParser:
     return parser
 
 
-def main() -> None:
-    asked = parser_of(__doc__).parse_args()
-    kept(range(asked.first, asked.first + asked.count), asked.file, one)
-
-
 if __name__ == "__main__":
-    main()
+    run(__doc__, make)

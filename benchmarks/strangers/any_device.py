@@ -153,7 +153,7 @@ def main(what: str | None, made: Callable[[int, bool], Case | None]) -> None:
             case = made(seed, asked.clean)
         return {"seed": seed} | analysed(case)
 
-    kept(range(asked.first, asked.first + asked.count), asked.file, one)
+    kept(asked, one)
 
 
 if __name__ == "__main__":

@@ -229,8 +229,7 @@ def main() -> None:
     which.add_argument("--one-mass", dest="one", action="store_const", const=one_mass, default=one)
     which.add_argument("--open-loop", dest="one", action="store_const", const=open_loop)
     asked = parser.parse_args()
-    seeds = range(asked.first, asked.first + asked.count)
-    kept(seeds, asked.file, asked.one)
+    kept(asked, asked.one)
 
 
 if __name__ == "__main__":

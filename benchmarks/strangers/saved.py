@@ -18,7 +18,7 @@ from scipy.interpolate import LSQUnivariateSpline
 from scipy.signal import butter, detrend, medfilt, resample, savgol_filter, sosfiltfilt
 
 from bayeshaptic.recordings import recording_from_arrays
-from benchmarks.strangers.__main__ import Row, analysed, kept, parser_of
+from benchmarks.strangers.__main__ import run
 from benchmarks.strangers.device import Array
 from benchmarks.strangers.draw import COUNT, UNITS, Case, Draw, base_of, begun, delay_of, states_of
 from benchmarks.strangers.recordings import EXCITATIONS, force_of, simulated
@@ -32,11 +32,6 @@ FILTERS = (
 RATES = ("newest row", "newest force", "lines", "Fourier")
 SCALES = ("deviation of one", "up to one")
 TREATMENTS = (*FILTERS, *RATES, *SCALES)
-
-
-def one(seed: int) -> Row:
-    """What became of the recording of a seed."""
-    return {"seed": seed} | analysed(make(seed))
 
 
 def make(seed: int) -> Case | None:
@@ -154,10 +149,5 @@ def _at_another_rate(
     return force[newest], position[newest] if treatment == "newest row" else between, rows, how
 
 
-def main() -> None:
-    asked = parser_of(__doc__).parse_args()
-    kept(range(asked.first, asked.first + asked.count), asked.file, one)
-
-
 if __name__ == "__main__":
-    main()
+    run(__doc__, make)

@@ -22,7 +22,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.frf_table import read_frf
 from bayeshaptic.recordings.signals.other_outputs import as_command_and_position
-from benchmarks.strangers.__main__ import Row, analysed, kept, parser_of
+from benchmarks.strangers.__main__ import run
 from benchmarks.strangers.device import Array, States
 from benchmarks.strangers.draw import (
     BAND_HZ,
@@ -47,11 +47,6 @@ KINDS = (
     *(f"{kind} beside a force" for kind in FORCED),
     *TABLES,
 )
-
-
-def one(seed: int) -> Row:
-    """What became of the recording of a seed."""
-    return {"seed": seed} | analysed(make(seed))
 
 
 def make(seed: int) -> Case:
@@ -187,10 +182,5 @@ def _noise(draw: Draw, signal: Array, most: float) -> Array:
     return signal.std() * draw.between(0.001, most) * draw.rng.normal(size=len(signal))
 
 
-def main() -> None:
-    asked = parser_of(__doc__).parse_args()
-    kept(range(asked.first, asked.first + asked.count), asked.file, one)
-
-
 if __name__ == "__main__":
-    main()
+    run(__doc__, make)

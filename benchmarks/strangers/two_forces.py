@@ -146,7 +146,7 @@ def main() -> None:
         kind = kinds[seed % len(kinds)]
         return {"seed": seed, "kind": kind} | analysed(make(kind, seed, asked.held))
 
-    kept(range(asked.first, asked.first + asked.count), asked.file, found)
+    kept(asked, found)
 
 
 if __name__ == "__main__":

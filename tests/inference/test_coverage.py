@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from benchmarks.coverage.calibration import combined, one_recording, uniform
+from benchmarks.coverage.calibration import combined, one_recording, pooled, uniform
 
 # Grasped devices take three times as long: fewer of them here.
 JOBS = [(case, 300 + seed) for case in ("lhifam free", "phantom free") for seed in range(4)]
@@ -16,10 +16,6 @@ JOBS += [(case, 300) for case in ("lhifam grasped", "phantom grasped")]
 @pytest.fixture(scope="module")
 def outcomes():
     return [one_recording(case, seed, ess=200, seconds=10.0) for case, seed in JOBS]
-
-
-def pooled(outcomes, field):
-    return np.concatenate([getattr(o, field)[~o.dominated] for o in outcomes])
 
 
 def test_intervals_cover_the_truth_in_nine_of_ten_recordings(outcomes):
