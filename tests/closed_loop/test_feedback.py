@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import json
 import pickle
-import re
 from dataclasses import replace
-from html import unescape
 from pathlib import Path
 
 import numpy as np
 import pytest
 from fake_analysis import FEEDBACK, fake_closed
-from one_truth import check_page
+from one_truth import check_page, text_of
 from test_measured import PERIOD_S, servo
 
 import bayeshaptic as bh
@@ -33,10 +31,6 @@ FRICTION_N = 20.0
 @pytest.fixture(scope="module")
 def closed() -> Closed:
     return bh.close_loop(servo(FRICTION_N), "rigid", delay_s=0.0, ess=300)
-
-
-def text_of(page: Path) -> str:
-    return " ".join(unescape(re.sub(r"<[^>]+>", " ", page.read_text(encoding="utf-8"))).split())
 
 
 def test_the_friction_of_a_servo_is_found_in_its_force(closed: Closed) -> None:

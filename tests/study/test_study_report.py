@@ -6,7 +6,6 @@ import json
 import re
 from dataclasses import replace
 from functools import cache, partial
-from html import unescape
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,6 +14,7 @@ import pytest
 from browser import needs_browser, probe
 from fake_analysis import fake_analysis, fake_closed
 from fake_study import NAMES, SIX_DB, fake_study
+from one_truth import text_of
 
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.report.figures.drawing.look import own_look
@@ -48,10 +48,6 @@ def study(shape: str) -> Any:
 def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     """The walls of few draws: their own tests are elsewhere."""
     monkeypatch.setattr(study_report, "table_of", partial(table_of, draws=60))
-
-
-def text_of(page: Path) -> str:
-    return " ".join(unescape(re.sub(r"<[^>]+>", " ", page.read_text(encoding="utf-8"))).split())
 
 
 @pytest.fixture(scope="module")

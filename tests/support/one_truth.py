@@ -45,7 +45,12 @@ def words_only(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def page_of(folder: Path) -> str:
-    page = (folder / "report.html").read_text(encoding="utf-8")
+    return text_of(folder / "report.html")
+
+
+def text_of(path: Path) -> str:
+    """What a reader sees of a page, in one line."""
+    page = path.read_text(encoding="utf-8")
     page = re.sub(r"<(style|script).*?</\1>|</?code>", "", page, flags=re.DOTALL)
     return " ".join(unescape(re.sub(r"<[^>]+>", " ", page)).split())
 
