@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from on_the_bench import usual_noise
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.base.begun import begin
@@ -216,7 +217,7 @@ def lhifam(friction: float, seconds: float, seeds: range) -> list[Recording]:
     bench = Bench.from_device("lhifam", False, "free")
     if friction:
         bench = bench.with_effect("coulomb_friction", force=friction * bench.force_rms)
-    played = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], seconds)
+    played = usual_noise(bench, seconds)
     made = [simulate(bench, played, seed=seed) for seed in seeds]
     return [bh.recording_from_arrays(**one.signals) for one in made]
 

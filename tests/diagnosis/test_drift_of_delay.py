@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from on_the_bench import recorded_on, usual_noise
 from scipy.signal import butter, sosfilt
 
 from bayeshaptic.diagnosis.close_loop import close_loop
@@ -15,11 +16,10 @@ from bayeshaptic.diagnosis.trials.drift import drift_trials
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.numerics.spending import Meter
-from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.report.headline import headline
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig import Bench
 from bayeshaptic.rig.effects.effect import Effect
 from bayeshaptic.types import Floats
 
@@ -49,9 +49,7 @@ class Fading(Effect):
 
 
 def recorded(bench: Bench) -> Recording:
-    low, high = bench.band_hz
-    made = simulate(bench, WhiteNoise(bench.force_rms, high, low, 30.0), seed=3)
-    return recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
+    return recorded_on(bench, usual_noise(bench, 30.0), seed=3)
 
 
 @pytest.mark.parametrize("told", [True, False])

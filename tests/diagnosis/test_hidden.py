@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from fake_analysis import fake_analysis
 from linear_bench import RIGID, Device
+from on_the_bench import recorded_on, usual_noise
 
 from bayeshaptic.diagnosis.close_loop import close_loop, with_average
 from bayeshaptic.diagnosis.closed import Closed
@@ -38,7 +39,7 @@ from bayeshaptic.recordings.study_file import read_study
 from bayeshaptic.report.headline import headline
 from bayeshaptic.report.loop.words import in_short
 from bayeshaptic.report.numbers.hidden import moves
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig import Bench
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.stability.mixed import mixed
 
@@ -231,9 +232,8 @@ def lagging() -> tuple[Bench, Closed]:
     """A held PHANToM with a lag that no test sees."""
     bench = Bench.from_device("phantom", held=True)
     bench = bench.with_effect("actuator_lag", time_constant_s=15e-6)
-    noise = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], 10.0)
-    made = simulate(bench, noise, seed=6)
-    recording = recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
+    noise = usual_noise(bench, 10.0)
+    recording = recorded_on(bench, noise, seed=6)
     return bench, close_loop(recording, "grasped", device="phantom")
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from on_the_bench import recorded_on, usual_noise
 from scipy.signal import chirp
 
 from bayeshaptic.diagnosis import loop as closing, state as states
@@ -25,10 +26,9 @@ from bayeshaptic.inference.least_squares import least_squares, polish
 from bayeshaptic.models import build_model
 from bayeshaptic.numerics.gauss_newton import jacobian
 from bayeshaptic.numerics.spending import Meter
-from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig import Bench
 from bayeshaptic.rig.effects.nonlinear import Drag
 from bayeshaptic.rig.excitation import Prescribed
 from bayeshaptic.stability import critical_stiffness
@@ -42,11 +42,7 @@ def fitted(held: bool, seconds: float, effects: Effects) -> tuple[Bench, Etfe, F
     bench = Bench.from_device("lhifam", held=held)
     for name, fields in effects:
         bench = bench.with_effect(name, **dict(fields))
-    low, high = bench.band_hz
-    made = simulate(bench, WhiteNoise(bench.force_rms, high, low, seconds), seed=8)
-    etfe = estimate_etfe(
-        recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
-    )
+    etfe = estimate_etfe(recorded_on(bench, usual_noise(bench, seconds), seed=8))
     return bench, etfe, least_squares(build_model("grasped" if held else "free", "lhifam"), etfe)
 
 
@@ -254,11 +250,7 @@ def test_two_modes_are_two_second_modes() -> None:
 def test_a_mass_does_not_stand_in_for_the_ground() -> None:
     """Of a device without a file the transmission becomes the spring, its far mass the ground."""
     bench = Bench.from_device("phantom", held=False).with_effect("centring_stiffness")
-    low, high = bench.band_hz
-    made = simulate(bench, WhiteNoise(bench.force_rms, high, low, 10.0), seed=8)
-    etfe = estimate_etfe(
-        recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
-    )
+    etfe = estimate_etfe(recorded_on(bench, usual_noise(bench, 10.0), seed=8))
     fit = least_squares(build_model("free", delay_s=bench.delay_s), etfe)
     assert fit.impossible == ("m2",)
     found = trace(etfe, fit)
@@ -317,8 +309,7 @@ def test_a_drag_under_sweeps_is_no_other_linear_device() -> None:
     bench = Bench.from_device("phantom", held=False)
     time = np.arange(12_000) * bench.period_s
     force = bench.force_rms * 2**0.5 * chirp(time % 2.0137, 0.5, 2.0137, 200.0)
-    made = simulate(bench.with_effect(Drag(0.001, "m1")), Prescribed(tuple(force)), seed=3)
-    recording = recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
+    recording = recorded_on(bench.with_effect(Drag(0.001, "m1")), Prescribed(tuple(force)), seed=3)
     etfe = estimate_etfe(recording, (1.75, 200.0))  # the whole sweep
     traced = trace(etfe, least_squares(build_model("free", "phantom"), etfe))
     assert not any(t.flagged for t in traced.before if t.family == "nonlinear" and _of_shapes(t))

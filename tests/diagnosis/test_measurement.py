@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from linear_bench import LHIFAM_HELD, Device
+from on_the_bench import recorded_on
 from scipy.linalg import expm
 from scipy.signal import butter, chirp, lfilter
 
@@ -43,8 +44,7 @@ COUNT = PHANTOM.encoder_resolution
 
 def recorded(bench: Bench, seed: int = SEED) -> Recording:
     """Eight seconds; the declared count is that of the device."""
-    made = simulate(bench, WhiteNoise(0.5 * bench.force_rms, 200.0, 0.7, SECONDS), seed=seed)
-    return recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
+    return recorded_on(bench, WhiteNoise(0.5 * bench.force_rms, 200.0, 0.7, SECONDS), seed=seed)
 
 
 def fitted(recording: Recording, bench: Bench) -> tuple[Etfe, Fit]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from on_the_bench import recorded_on
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.close_loop import close_loop
@@ -39,8 +40,7 @@ def recorded(device: str, *effects: tuple[str, Any]) -> Recording:
     bench = BENCHES[device]
     for name, fields in effects:
         bench = bench.with_effect(name, **dict(fields))
-    made = simulate(bench, WhiteNoise(bench.force_rms, 200.0, 0.7, SECONDS), seed=11)
-    return recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
+    return recorded_on(bench, WhiteNoise(bench.force_rms, 200.0, 0.7, SECONDS), seed=11)
 
 
 def with_moment(device: str, name: str) -> Recording:

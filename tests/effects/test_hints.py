@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from on_the_bench import recorded_on, usual_noise
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.state import State
@@ -14,8 +15,7 @@ from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting, NonlinearEffect
 from bayeshaptic.effects.nonlinear.springs import Backlash, HardeningSpring
 from bayeshaptic.inference.likelihood import Likelihood
-from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig import Bench
 
 EFFECTS: dict[str, NonlinearEffect] = {
     "hardening_connection": HardeningSpring(CONNECTION),
@@ -29,9 +29,7 @@ EFFECTS: dict[str, NonlinearEffect] = {
 def test_first_order_is_what_a_little_of_the_force_does(name: str, device: str) -> None:
     """Of a cubic spring a unit, a newton to the cubed metre, moves nothing that is a number."""
     rig = Bench.from_device(device, held=False).with_effect(name)
-    low, high = rig.band_hz
-    made = simulate(rig, WhiteNoise(rig.force_rms, high, low, 10.0), seed=3)
-    recording = recording_from_arrays(**made.signals, encoder_resolution=rig.encoder_resolution)
+    recording = recorded_on(rig, usual_noise(rig, 10.0), seed=3)
     etfe = bh.estimate_etfe(recording)
     fit = bh.least_squares(bh.free(device=device), etfe)
     tryout = Tryout(State(etfe, fit), recording)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from on_the_bench import recorded_on
 from plain_stepping import step_through
 
 from bayeshaptic.diagnosis.state import State, fit_part
@@ -27,7 +28,7 @@ from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.models.response.motion import linear_motions
-from bayeshaptic.recordings import Recording, recording_from_arrays
+from bayeshaptic.recordings import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from bayeshaptic.rig.excitation import Prescribed
@@ -99,8 +100,7 @@ def command() -> Any:
 
 
 def recorded(bench: Bench) -> Recording:
-    made = simulate(bench, command(), seed=SEED)
-    return recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
+    return recorded_on(bench, command(), seed=SEED)
 
 
 def plainly(mechanism: Any, forces: list[Internal]) -> Any:

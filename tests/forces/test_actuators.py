@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from on_the_bench import recorded_on
 
 from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
 from bayeshaptic.diagnosis.state import State, Trial
@@ -16,9 +17,8 @@ from bayeshaptic.effects.library import effects
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.numerics.spending import Meter
-from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.estimate import estimate_etfe
-from bayeshaptic.rig import Bench, simulate
+from bayeshaptic.rig import Bench
 from bayeshaptic.rig.effects.effect import Effect
 from bayeshaptic.rig.excitation import Prescribed
 from bayeshaptic.stability import critical_stiffness
@@ -47,8 +47,7 @@ class Characteristic(Effect):
 def state_of(actuator: Characteristic, offset: float = 0.0) -> State:
     """A held device behind that actuator, and the linear model fitted to its recording."""
     command = offset + 4.0 * np.random.default_rng(SEED).standard_normal(SAMPLES)
-    made = simulate(HELD.with_effect(actuator), Prescribed(command), seed=SEED)
-    recording = recording_from_arrays(**made.signals, encoder_resolution=HELD.encoder_resolution)
+    recording = recorded_on(HELD.with_effect(actuator), Prescribed(command), seed=SEED)
     etfe = estimate_etfe(recording)
     return State(etfe, least_squares(build_model("grasped", "lhifam"), etfe))
 

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from on_the_bench import recorded_on
 
 from bayeshaptic.diagnosis.trials.forces.besides import settled
 from bayeshaptic.diagnosis.trials.forces.simulation import Simulation
@@ -16,9 +17,8 @@ from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.models.response.motion import linear_motion
-from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.estimate import estimate_etfe
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig import Bench, WhiteNoise
 from bayeshaptic.types import Floats
 
 FRICTION = 1.2
@@ -31,8 +31,7 @@ def simulated(held: bool) -> tuple[Simulation, Floats, float]:
     device = Bench.from_device("lhifam", held=held)
     device = replace(device, values={**device.values, **LIGHTLY_DAMPED})
     bench = device.with_effect("coulomb_friction", force=FRICTION)
-    made = simulate(bench, WhiteNoise(4.0, 300.0, 0.3, 10.0), seed=3)
-    recording = recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
+    recording = recorded_on(bench, WhiteNoise(4.0, 300.0, 0.3, 10.0), seed=3)
     model = build_model("grasped" if held else "free", "lhifam")
     usual = least_squares(model, estimate_etfe(recording))
     truth = {**bench.values, "delay_s": bench.delay_s}

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from on_the_bench import recorded_on
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
@@ -18,9 +19,8 @@ from bayeshaptic.effects.nonlinear.internal_force import MOTOR
 from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
-from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.estimate import estimate_etfe
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig import Bench, WhiteNoise
 from bayeshaptic.rig.effects.nonlinear import Drag
 from bayeshaptic.stability import critical_stiffness
 
@@ -29,8 +29,7 @@ LHIFAM = Bench.from_device("lhifam")
 
 def state_of(bench: Bench) -> State:
     """A free device fitted to ten seconds of white noise."""
-    made = simulate(bench, WhiteNoise(4.0, 300.0, 0.3, 10.0), seed=3)
-    recording = recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
+    recording = recorded_on(bench, WhiteNoise(4.0, 300.0, 0.3, 10.0), seed=3)
     etfe = estimate_etfe(recording)
     return State(etfe, least_squares(build_model("free", "lhifam"), etfe))
 

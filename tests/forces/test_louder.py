@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from on_the_bench import recorded_on, usual_noise
 from scipy.signal import butter, csd, sosfiltfilt, welch
 
 from bayeshaptic.diagnosis.state import State, log_likelihoods
@@ -21,10 +22,9 @@ from bayeshaptic.effects.nonlinear.springs import HardeningSpring
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import build_model
-from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig import Bench
 from bayeshaptic.types import Floats
 
 FORCES = ("coulomb_friction", "drag")
@@ -34,9 +34,7 @@ def recorded(held: bool, seconds: float = 20.0) -> tuple[Bench, Recording]:
     bench = Bench.from_device("phantom", held=held)
     for effect in FORCES:
         bench = bench.with_effect(effect)
-    low, high = bench.band_hz
-    made = simulate(bench, WhiteNoise(bench.force_rms, high, low, seconds), seed=4)
-    return bench, recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
+    return bench, recorded_on(bench, usual_noise(bench, seconds), seed=4)
 
 
 @pytest.fixture(scope="module")

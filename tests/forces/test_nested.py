@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from on_the_bench import recorded_on, usual_noise
 
 from bayeshaptic.diagnosis import acceptance
 from bayeshaptic.diagnosis.state import State, Trial
@@ -28,9 +29,8 @@ from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.numerics.spending import Meter
-from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.estimate import estimate_etfe
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig import Bench
 
 
 @pytest.mark.parametrize("law", [StribeckFriction, RisingFriction, FrictionAlongTheWay])
@@ -83,9 +83,7 @@ def test_friction_and_a_drag_are_found_in_the_place_of_friction_that_falls(
         monkeypatch.setattr(module, "effects", lambda family: kinds)
     bench = Bench.from_device("phantom", held=True)
     bench = bench.with_effect("coulomb_friction").with_effect("drag")
-    low, high = bench.band_hz
-    made = simulate(bench, WhiteNoise(bench.force_rms, high, low, 20.0), seed=4)
-    recording = recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
+    recording = recorded_on(bench, usual_noise(bench, 20.0), seed=4)
     model = build_model("grasped", delay_s=bench.delay_s, period_s=recording.period_s)
     etfe = estimate_etfe(recording)
     state = State(etfe, least_squares(model, etfe))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from along_the_way import DELAY_S, guided
+from on_the_bench import recorded_on
 from scipy.special import ndtr
 
 from bayeshaptic.diagnosis.residuals.columns import as_normal, nonlinear_tests
@@ -38,10 +39,9 @@ from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.inference.likelihood import Likelihood
 from bayeshaptic.models import build_model
 from bayeshaptic.numerics.spending import Meter
-from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import compress
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig import Bench, WhiteNoise
 from bayeshaptic.rig.effects.effect import Effect as BenchEffect
 from bayeshaptic.rig.effects.friction import StribeckFriction
 from bayeshaptic.rig.effects.nonlinear import Drag
@@ -56,8 +56,7 @@ SECONDS, SEED = 10.0, 3
 
 def state_of(bench: Bench, model: str = "free") -> State:
     """The model fitted to ten seconds of white noise."""
-    made = simulate(bench, WhiteNoise(4.0, 300.0, 0.3, SECONDS), seed=SEED)
-    recording = recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
+    recording = recorded_on(bench, WhiteNoise(4.0, 300.0, 0.3, SECONDS), seed=SEED)
     etfe = estimate_etfe(recording)
     return State(etfe, least_squares(build_model(model, "lhifam"), etfe))
 

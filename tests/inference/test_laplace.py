@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from on_the_bench import usual_noise
 
 import bayeshaptic as bh
 from bayeshaptic.effects.library import effect_class
@@ -16,7 +17,7 @@ from bayeshaptic.inference.sampling.ensembles import _spread_start, warmed_up
 from bayeshaptic.inference.sampling.laplace import laplace
 from bayeshaptic.numerics.mixture import student
 from bayeshaptic.numerics.weights import effective, normalised
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig import Bench, simulate
 
 # Dampers of which only the sum is known: b1 is within its error of zero.
 RIDGE = {"m1": 1.44e-3, "b1": 0.57e-3, "bc": 5.1e-3, "kc": 34.7, "m2": 0.113e-3, "b2": 25e-3}
@@ -24,7 +25,7 @@ RIDGE = {"m1": 1.44e-3, "b1": 0.57e-3, "bc": 5.1e-3, "kc": 34.7, "m2": 0.113e-3,
 
 def _recording() -> bh.Recording:
     bench = Bench.from_device("phantom", values=RIDGE)
-    noise = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], 30.0)
+    noise = usual_noise(bench, 30.0)
     run = simulate(bench, noise, seed=1010)
     return bh.recording_from_arrays(**run.signals)
 

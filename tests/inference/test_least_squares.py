@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linear_bench import LHIFAM_FREE, Device
+from on_the_bench import usual_noise
 
 from bayeshaptic.devices import load_device
 from bayeshaptic.errors import InputError
@@ -19,7 +20,7 @@ from bayeshaptic.numerics.truncated_normal import draw_above, moments_above
 from bayeshaptic.recordings import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import compress
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig import Bench, simulate
 from benchmarks.strangers.any_device import make as any_device
 
 fitting = sys.modules[least_squares.__module__]
@@ -27,7 +28,7 @@ CASES = [("lhifam", False), ("phantom", True)]
 
 
 def measure(bench: Bench, seed: int, seconds: float = 30.0):
-    noise = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], seconds)
+    noise = usual_noise(bench, seconds)
     run = simulate(bench, noise, seed=seed)
     recording = Recording(run.force, run.position, run.period_s, run.force_unit, run.position_unit)
     return estimate_etfe(recording)

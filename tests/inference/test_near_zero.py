@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from on_the_bench import usual_noise
 
 import bayeshaptic as bh
 from bayeshaptic.inference import sampler
@@ -25,7 +26,7 @@ from bayeshaptic.inference.sampling.near_zero import (
     start_of,
     with_near_zero,
 )
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig import Bench, simulate
 
 
 def measured(seed: int) -> tuple[bh.Etfe, Bench]:
@@ -225,7 +226,7 @@ LIGHT = {"m1": 0.05, "b1": 0.23, "bc": 22.6, "kc": 111e3, "m2": 3.1, "b2": 0.0}
 
 def without_file(values: dict[str, float], seconds: float) -> tuple[bh.Etfe, bh.Fit, float]:
     bench = Bench.from_device("lhifam", values=values)
-    noise = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], seconds)
+    noise = usual_noise(bench, seconds)
     etfe = bh.estimate_etfe(bh.recording_from_arrays(**simulate(bench, noise, seed=3).signals))
     fit = bh.least_squares(bh.free(delay_s=bench.delay_s, period_s=bench.period_s), etfe)
     return etfe, fit, bench.true_critical_stiffness()

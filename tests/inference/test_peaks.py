@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from on_the_bench import usual_noise
 
 import bayeshaptic as bh
 from bayeshaptic.inference.sampling.ensembles import joined, warmed_up
@@ -99,7 +100,7 @@ SWAPPED |= {"bs": 0.0287, "ks": 175, "mh": 0.00396, "bh": 0.154, "kh": 1.64}
 @pytest.fixture(scope="module")
 def held():
     bench = Bench.from_device("phantom", held=True, values=SWAPPED)
-    noise = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], 12.0)
+    noise = usual_noise(bench, 12.0)
     recording = bh.recording_from_arrays(**simulate(bench, noise, seed=6).signals)
     etfe = bh.estimate_etfe(recording)
     model = bh.grasped(delay_s=bench.delay_s, period_s=bench.period_s)

@@ -9,11 +9,11 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from on_the_bench import recorded_on, usual_noise
 
 from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.numerics.spending import metered
-from bayeshaptic.recordings import recording_from_arrays
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig import Bench
 
 # Held?, effect, its fields, device file? -> millions of values of a rational model at a frequency.
 COUNTED: list[tuple[bool, str | None, dict[str, Any], bool, float]] = [
@@ -34,9 +34,7 @@ def test_a_report_evaluates_no_more_than_twice_what_it_did(
     bench = Bench.from_device("lhifam", held=held)
     if effect is not None:
         bench = bench.with_effect(effect, **fields)
-    low, high = bench.band_hz
-    made = simulate(bench, WhiteNoise(bench.force_rms, high, low, 8.0), seed=8)
-    recording = recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
+    recording = recorded_on(bench, usual_noise(bench, 8.0), seed=8)
     known = {"device": "lhifam"} if with_file else {"delay_s": bench.delay_s}
     with metered() as meter:
         close_loop(recording, "grasped" if held else "free", **known)

@@ -7,13 +7,13 @@ from functools import cache
 
 import numpy as np
 import pytest
+from on_the_bench import recorded_on
 
 from bayeshaptic.diagnosis.close_loop import close_loop
-from bayeshaptic.recordings import recording_from_arrays
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.signals.lone import lone, without_lone
-from bayeshaptic.rig import Bench, Multisine, WhiteNoise, simulate
+from bayeshaptic.rig import Bench, Multisine, WhiteNoise
 from bayeshaptic.rig.excitation import BinaryNoise, Chirp, Steps
 
 SECONDS = 6.0
@@ -28,8 +28,7 @@ EXCITATIONS = {
 @cache
 def recorded(name: str, excitation: str = "white", held: bool = False) -> Recording:
     bench = Bench.from_device(name, held=held)
-    made = simulate(bench, EXCITATIONS[excitation](bench.force_rms), seed=2)
-    return recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
+    return recorded_on(bench, EXCITATIONS[excitation](bench.force_rms), seed=2)
 
 
 def struck(recording: Recording, count: int, size: float, seed: int = 0) -> Recording:
@@ -92,8 +91,7 @@ def test_a_few_that_hid_the_motion_are_named_and_cost_nothing(count: int) -> Non
 
 def test_they_are_filled_in_before_periods_are_averaged() -> None:
     bench = Bench.from_device("lhifam")
-    made = simulate(bench, Multisine(bench.force_rms, 1.0, 200.0, 0.5, 3), seed=2)
-    clean = recording_from_arrays(**made.signals, encoder_resolution=bench.encoder_resolution)
+    clean = recorded_on(bench, Multisine(bench.force_rms, 1.0, 200.0, 0.5, 3), seed=2)
     plain, mended = estimate_etfe(clean), estimate_etfe(struck(clean, 4, 20.0))
     assert [n.topic for n in mended.notices].count("wild samples") == 1
     assert np.sum(mended.variance) < 1.1 * np.sum(plain.variance)

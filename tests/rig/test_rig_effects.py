@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from on_the_bench import usual_noise
 from plain_bench_stepper import plainly
 from rig_reference import Transfer, continuous, sampled
 from scipy.integrate import solve_ivp
@@ -377,7 +378,7 @@ def test_a_grip_that_changes_at_once_is_one_hand_and_then_another() -> None:
 @pytest.mark.parametrize(("device", "held"), [("lhifam", True), ("phantom", False)])
 def test_every_effect_shows_at_its_typical_strength(device: str, held: bool) -> None:
     bench = Bench.from_device(device, held=held)
-    excitation = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], seconds=3.0)
+    excitation = usual_noise(bench, 3.0)
     plain = simulate(bench, excitation, seed=6)
     needs_hand = {"reflex", "grip_drift"}
     for name in sorted(REGISTRY):

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 import scipy.stats
+from on_the_bench import usual_noise
 
 import bayeshaptic as bh
 from bayeshaptic.diagnosis.limit_known import LimitKnown
-from bayeshaptic.rig import Bench, WhiteNoise, simulate
+from bayeshaptic.rig import Bench, simulate
 from bayeshaptic.stability import each_draw
 from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.stability.tail import low_quantile
@@ -140,7 +141,7 @@ def test_what_was_found_of_all_draws_is_not_taken_for_what_a_thinned_run_holds()
 @pytest.fixture(scope="module")
 def recorded():
     bench = Bench.from_device("lhifam")
-    noise = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], 10.0)
+    noise = usual_noise(bench, 10.0)
     run = simulate(bench, noise, seed=6)
     return bh.recording_from_arrays(**run.signals)
 

@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
+from on_the_bench import usual_noise
 
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.library import effect_class
@@ -17,7 +18,7 @@ from bayeshaptic.models import Model, build_model
 from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import Etfe
-from bayeshaptic.rig import Bench, Effect, WhiteNoise, register as on_the_bench, simulate
+from bayeshaptic.rig import Bench, Effect, register as on_the_bench, simulate
 from bayeshaptic.rig.dynamics.structure import Relaxation, Structure
 
 
@@ -104,7 +105,7 @@ def plain_bench(device: str, held: bool) -> Bench:
 def _recorded(case_id: str) -> Etfe:
     case = next(case for case in CASES if case.id == case_id)
     bench = case.truth
-    excitation = WhiteNoise(bench.force_rms, bench.band_hz[1], bench.band_hz[0], seconds=12.0)
+    excitation = usual_noise(bench, 12.0)
     run = simulate(bench, excitation, seed=11)
     return estimate_etfe(recording_from_arrays(**run.signals))
 
