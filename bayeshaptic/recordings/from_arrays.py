@@ -84,13 +84,7 @@ def recording_from_arrays(
         from 1), and for time stamps that show no even sampling.
     """
     where = str(source) if source is not None else name
-    signals = _Signals(
-        _signal(force, "force", where),
-        _signal(position, "position", where),
-        None if reference is None else _signal(reference, "reference", where),
-    )
-    stamps = None if time is None else _signal(time, "time", where)
-    _refuse_lengths(where, **vars(signals), time=stamps)
+    signals, stamps = _as_given(force, position, reference, time, where)
     if not (encoder_resolution is None or 0 < encoder_resolution < np.inf):
         raise InputError(f"{where}: encoder_resolution must be above 0, not {encoder_resolution}")
     if time is None and period_s is None and source is None:
@@ -140,6 +134,24 @@ class _Rows:
     period_s: float
     joints: tuple[int, ...]
     notices: tuple[Notice, ...]
+
+
+def _as_given(
+    force: ArrayLike,
+    position: ArrayLike,
+    reference: ArrayLike | None,
+    time: ArrayLike | None,
+    where: str,
+) -> tuple[_Signals, Floats | None]:
+    """The signals and their time stamps as arrays of numbers, all of one length."""
+    signals = _Signals(
+        _signal(force, "force", where),
+        _signal(position, "position", where),
+        None if reference is None else _signal(reference, "reference", where),
+    )
+    stamps = None if time is None else _signal(time, "time", where)
+    _refuse_lengths(where, **vars(signals), time=stamps)
+    return signals, stamps
 
 
 def _on_a_clock(

@@ -27,10 +27,9 @@ def read_npz(path: Path) -> Arrays:
     # zipfile and NumPy meet damaged files with whatever exception their parsers run into.
     try:
         with zipfile.ZipFile(path) as archive:
-            for name in archive.namelist():
-                if name.endswith(".npy"):
-                    with archive.open(name) as file:
-                        found.update(_read(file, path, name.removesuffix(".npy")))
+            for name in (one for one in archive.namelist() if one.endswith(".npy")):
+                with archive.open(name) as file:
+                    found.update(_read(file, path, name.removesuffix(".npy")))
     except InputError:
         raise
     except zipfile.BadZipFile as error:

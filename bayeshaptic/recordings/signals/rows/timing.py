@@ -161,6 +161,18 @@ def _from_stamps(time_s: Floats, where: str) -> Timing:
             f"{where}: most rows have the time of the row before them: the stamps are too coarse "
             "to tell the period; give it with --period-s"
         )
+    _refuse_standing_or_back(time_s, steps, period, where)
+    gaps = _gaps(time_s, period)
+    if len(gaps):
+        return _with_gaps(time_s, gaps, period, where)
+    jitter = float(np.std(steps)) / period
+    if jitter > MOST_JITTER:
+        raise InputError(_uneven(where, steps, jitter))
+    return Timing(slope, jitter)
+
+
+def _refuse_standing_or_back(time_s: Floats, steps: Floats, period: float, where: str) -> None:
+    """Refuse stamps of which some do not advance, by what they look like."""
     back = np.flatnonzero(steps <= 0)
     several = 3  # rows of the time of the row before: a logger that writes rows twice
     if len(back) >= several and np.all(steps[back] == 0):
@@ -181,13 +193,6 @@ def _from_stamps(time_s: Floats, where: str) -> Timing:
             "cut the recording there, or give the period with --period-s if only the stamps are "
             "wrong"
         )
-    gaps = _gaps(time_s, period)
-    if len(gaps):
-        return _with_gaps(time_s, gaps, period, where)
-    jitter = float(np.std(steps)) / period
-    if jitter > MOST_JITTER:
-        raise InputError(_uneven(where, steps, jitter))
-    return Timing(slope, jitter)
 
 
 def _uneven(where: str, steps: Floats, jitter: float) -> str:
