@@ -12,7 +12,7 @@ import multiprocessing
 import os
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -179,21 +179,25 @@ def run_batch(
         batch = _Batch(folder, settings, command, tell, {str(job.source): job for job in work})
         old = read_manifest(folder) if resume else {}
         todo = [job for job in work if not batch.is_done(old.get(str(job.source)), job)]
-        execute = _executor(executor)
-        again: list[Job] = []
         try:
             batch.write()  # for whoever asks how far it is
-            for outcome in execute(report_timed, todo) if todo else ():
-                if outcome.error is None or outcome.refused:
-                    batch.end(outcome)
-                else:
-                    again.append(outcome.item)
-            for job in again:
-                for outcome in execute(report_timed, [job]):
-                    batch.end(outcome)
+            _report_each(todo, _executor(executor), batch)
         finally:
             batch.write()
         return tuple(batch.entries.values())
+
+
+def _report_each(todo: Sequence[Job], execute: Executor, batch: _Batch) -> None:
+    """Every job once; those that failed, unless they were refused, once more by themselves."""
+    again: list[Job] = []
+    for outcome in execute(report_timed, todo) if todo else ():
+        if outcome.error is None or outcome.refused:
+            batch.end(outcome)
+        else:
+            again.append(outcome.item)
+    for job in again:
+        for outcome in execute(report_timed, [job]):
+            batch.end(outcome)
 
 
 def report_timed(job: Job) -> tuple[tuple[Reported, ...], float]:
