@@ -86,14 +86,8 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
             options.report(0.0, "checking the recording")
             # Where a sample is a piece's first, no other foretells it.
             whole = replace(without_lone(unbroken(measurement)), joints=measurement.joints)
-            notices += told(measurement.feedback, check_recording(whole, device))
-            unread = notices
-            if one_mass:  # followed in time instead
-                if measurement.reference is not None and has_feedback(notices):
-                    notices += (_NEEDS_NONE,)
-                measurement = replace(measurement, reference=None)
-            else:
-                measurement, notices = through_reference(measurement, notices)
+            unread = (*notices, *told(measurement.feedback, check_recording(whole, device)))
+            measurement, notices = _with_what_was_followed(measurement, unread, one_mass)
             if not any(notice.topic == "feedback" for notice in notices):
                 notices += _first_of_the_period(whole, too_little(whole))
                 if not one_mass:
@@ -113,6 +107,17 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
     if lever_m is None and device is not None:
         lever_m = device.lever_m
     return Opened(etfe, device, notices + etfe.notices, clock.seconds, lever_m, name)
+
+
+def _with_what_was_followed(
+    recording: Recording, notices: tuple[Notice, ...], one_mass: bool
+) -> tuple[Recording, tuple[Notice, ...]]:
+    """With what the controller followed; without, where one mass is followed in time instead."""
+    if not one_mass:
+        return through_reference(recording, notices)
+    if recording.reference is not None and has_feedback(notices):
+        notices += (_NEEDS_NONE,)
+    return replace(recording, reference=None), notices
 
 
 def _first_of_the_period(recording: Recording, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:

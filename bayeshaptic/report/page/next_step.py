@@ -23,6 +23,7 @@ from bayeshaptic.report.numbers.stiffest import too_stiff
 from bayeshaptic.report.objections import changes, is_open
 
 if TYPE_CHECKING:
+    from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.report.headline import Headline
 
 
@@ -151,19 +152,7 @@ def _after_fit(result: Result, command: str, new: str) -> Step:
     """Where the recording will do, and what came of it will not."""
     analysis = result.analysis
     if not analysis.posterior.converged:
-        seed = f"--seed {analysis.posterior.seed + 1}"
-        # A spring to the ground, as of a joystick, may pass for a hand, which leaves more peaks.
-        if analysis.model.held and not said_who_holds(analysis):
-            return Step(
-                "Say so, if nobody holds the device. Else let the sampler begin elsewhere "
-                f"({seed}), and tell it what is known of the device (--device, --delay-s):",
-                f"{command} --held no",
-            )
-        return Step(
-            "Let the sampler begin elsewhere, and tell it what is known of the device "
-            "(--device, --delay-s):",
-            f"{command} {seed}",
-        )
+        return _not_converged(analysis, command)
     if is_open(analysis):
         return Step(
             "Let the force be larger and slower, or record longer, so that the device moves as "
@@ -203,6 +192,23 @@ def _after_fit(result: Result, command: str, new: str) -> Step:
         "Try another base model (--model free, --model grasped) or another band (--band "
         "LOW,HIGH), and see whether the misfit goes:",
         f"{command} --model free",
+    )
+
+
+def _not_converged(analysis: Analysis, command: str) -> Step:
+    """Where the chains of the sampler do not agree."""
+    seed = f"--seed {analysis.posterior.seed + 1}"
+    # A spring to the ground, as of a joystick, may pass for a hand, which leaves more peaks.
+    if analysis.model.held and not said_who_holds(analysis):
+        return Step(
+            "Say so, if nobody holds the device. Else let the sampler begin elsewhere "
+            f"({seed}), and tell it what is known of the device (--device, --delay-s):",
+            f"{command} --held no",
+        )
+    return Step(
+        "Let the sampler begin elsewhere, and tell it what is known of the device "
+        "(--device, --delay-s):",
+        f"{command} {seed}",
     )
 
 
