@@ -114,11 +114,8 @@ def etfe_critical_stiffness(
         the true limit may be lower.
     """
     data = response_data(etfe, sensor)
-    low, high = etfe.band_hz
-    step = 0.03  # relative distance of the places where the phase is looked at
-    count = max(int(np.log(high / low) / step), 2)
-    fits = [fit for hz in np.geomspace(low, high, count) if (fit := local_fit(data, hz))]
-    band = f"{low:.4g} and {high:.4g} Hz"
+    fits = _local_fits(data, *etfe.band_hz)
+    band = "{:.4g} and {:.4g} Hz".format(*etfe.band_hz)
 
     def missing(reason: str) -> EtfeCriticalStiffness:
         return EtfeCriticalStiffness(None, None, None, None, etfe.stiffness_unit, reason)
@@ -148,6 +145,14 @@ def etfe_critical_stiffness(
     return EtfeCriticalStiffness(
         q05, q50, q95, middle, etfe.stiffness_unit, None, caveat, samples, *_steepness(fits, middle)
     )
+
+
+def _local_fits(data: ResponseData, low_hz: float, high_hz: float) -> list[LocalFit]:
+    """The response around places all along the band, where it is not too noisy."""
+    step = 0.03  # relative distance of the places where the phase is looked at
+    count = max(int(np.log(high_hz / low_hz) / step), 2)
+    places = np.geomspace(low_hz, high_hz, count)
+    return [fit for hz in places if (fit := local_fit(data, hz))]
 
 
 def _steepness(fits: list[LocalFit], frequency_hz: float) -> tuple[float, float]:

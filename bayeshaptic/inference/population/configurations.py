@@ -133,27 +133,12 @@ def infer_configurations(
         described beside the others.
     """
     report = progress or silent
-    measured = np.unique(np.asarray(coordinate, float))
-    if len(coordinate) != len(posteriors):
-        raise InputError(
-            f"{len(posteriors)} posteriors, but {len(coordinate)} configurations: give one each."
-        )
-    if len(measured) < FEWEST:
-        raise InputError(
-            f"{len(measured)} different configurations cannot say how the device changes between "
-            f"them; record at least {FEWEST}."
-        )
+    measured = _places(posteriors, coordinate)
     model = common_model(posteriors)
     here = study_coordinates(model, posteriors)
-    mean, sd = prior_moments(model, here)
     own = tuple(gaussian_likelihood(one, here) for one in posteriors)
-    path = Trend(
-        own,
-        np.asarray(coordinate, float),
-        np.isin(model.names, HAND),
-        mean,
-        sd,
-    )
+    hand = np.isin(model.names, HAND)
+    path = Trend(own, np.asarray(coordinate, float), hand, *prior_moments(model, here))
     tune, run, rest = np.random.SeedSequence(seed).spawn(3)
     report(0.0, "configurations: first look")
     path = settled_nearby(path, own, posteriors, here, path.guess()[0])
@@ -171,12 +156,32 @@ def infer_configurations(
             f"what is recorded in configuration {where} leaves too much open to be on one curve "
             "with the others."
         )
-    notices = chains.notices
-    if len(measured) < 5:
-        who = "held" if any(name in HAND for name in model.names) else "nobody holding it"
-        text = (
-            f"{len(measured)} configurations ({who}) say little about what is between them. How "
-            "fast the device changes there is the prior's guess as much as a finding."
-        )
-        notices = (*notices, Notice("note", "configurations", text))
+    notices = (*chains.notices, *_of_few_places(measured, model))
     return Configurations(measured, model, chains.resting(), notices, path, here)
+
+
+def _places(posteriors: Sequence[Posterior], coordinate: Sequence[float]) -> Floats:
+    """The different configurations in their order, refused where they are too few."""
+    if len(coordinate) != len(posteriors):
+        raise InputError(
+            f"{len(posteriors)} posteriors, but {len(coordinate)} configurations: give one each."
+        )
+    measured = np.unique(np.asarray(coordinate, float))
+    if len(measured) < FEWEST:
+        raise InputError(
+            f"{len(measured)} different configurations cannot say how the device changes between "
+            f"them; record at least {FEWEST}."
+        )
+    return measured
+
+
+def _of_few_places(measured: Floats, model: Model) -> tuple[Notice, ...]:
+    """That the curve between so few is a guess as much as a finding."""
+    if len(measured) >= 5:
+        return ()
+    who = "held" if any(name in HAND for name in model.names) else "nobody holding it"
+    text = (
+        f"{len(measured)} configurations ({who}) say little about what is between them. How "
+        "fast the device changes there is the prior's guess as much as a finding."
+    )
+    return (Notice("note", "configurations", text),)

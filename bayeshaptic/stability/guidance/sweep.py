@@ -136,12 +136,7 @@ def sweep(
         )
     column = model.names.index(name)
     now = float(np.median(vectors[:, column]))
-    if factors is not None and add is not None:
-        raise InputError("factors and add are both given; give one of them")
-    given = FACTORS if factors is None and add is None else factors if add is None else add
-    steps = np.sort(np.ravel(np.asarray(given, float)))
-    if not steps.size:
-        raise InputError(f"{'factors' if add is None else 'add'} is empty; give one number or more")
+    steps = _steps(factors, add)
     moved = np.repeat(vectors[None], len(steps), axis=0)
     moved[:, :, column] = (
         moved[:, :, column] * steps[:, None]
@@ -170,6 +165,17 @@ def sweep(
         model.stiffness_unit,
         add is not None,
     )
+
+
+def _steps(factors: ArrayLike | None, add: ArrayLike | None) -> Floats:
+    """The factors, or what is added, in ascending order; by default the usual factors."""
+    if factors is not None and add is not None:
+        raise InputError("factors and add are both given; give one of them")
+    given = FACTORS if factors is None and add is None else factors if add is None else add
+    steps = np.sort(np.ravel(np.asarray(given, float)))
+    if not steps.size:
+        raise InputError(f"{'factors' if add is None else 'add'} is empty; give one number or more")
+    return steps
 
 
 def _most(kinds: NDArray[np.int_], hertz: Floats) -> tuple[int, float]:
