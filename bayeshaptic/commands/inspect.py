@@ -7,6 +7,7 @@ import json
 import os
 import shlex
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,13 +81,18 @@ def run(arguments: argparse.Namespace) -> int:
 
 def lines(found: Overview) -> list[str]:
     """The table, the doubts, and the suggested line."""
-    from bayeshaptic.recordings.columns import POSITIONS
-    from bayeshaptic.recordings.overview.overview import doubts, is_guess
-    from bayeshaptic.recordings.overview.roles import is_measured
-
-    roles = {name: role for role, name in found.roles.items()}
     most_columns = 40
     shown = found.columns[:most_columns]
+    table = _table(shown, found)
+    if len(found.columns) > len(shown):
+        table.append(f"and {len(found.columns) - len(shown)} more")
+    texts = (_text_in(one, found) for one in shown)
+    return [*table, *_doubts(found), *filter(None, texts), *_how_to_read(found)]
+
+
+def _table(shown: Sequence[ColumnFacts], found: Overview) -> list[str]:
+    """A line a column, below their heads."""
+    roles = {name: role for role, name in found.roles.items()}
     width = max(len("name"), *(len(printable(one.name)) for one in shown))
     table = [f"{'name':{width}}  samples  {'low to high':^24}  resolution"]
     for one in shown:
@@ -97,8 +103,15 @@ def lines(found: Overview) -> list[str]:
         name, span = printable(one.name), f"{one.low:10.4g} to {one.high:<10.4g}"
         span = f"{'-':^24}" if one.low != one.low else span
         table.append(f"{name:{width}}  {one.samples:7d}  {span}  {step:>10}{rate}{picture}{role}")
-    if len(found.columns) > len(shown):
-        table.append(f"and {len(found.columns) - len(shown)} more")
+    return table
+
+
+def _doubts(found: Overview) -> list[str]:
+    """What a person should look at before the guesses are used."""
+    from bayeshaptic.recordings.overview.overview import doubts, is_guess
+    from bayeshaptic.recordings.overview.roles import is_measured
+
+    told = []
     by_name = {one.name: one for one in found.columns}
     for role, name in found.roles.items():
         said = [doubts(by_name[name], role)]
@@ -108,21 +121,26 @@ def lines(found: Overview) -> list[str]:
         if role == "force" and is_measured(name):
             said.insert(0, "measured, not commanded? Then write measured_force= for force=")
         if text := "; ".join(filter(None, said)):
-            table.append(f"{role}: {printable(name)}: {text}")
-    table += filter(None, (_text_in(one, found) for one in shown))
+            told.append(f"{role}: {printable(name)}: {text}")
+    return told
+
+
+def _how_to_read(found: Overview) -> list[str]:
+    """The options that the file is read with, or what there is too little of for them."""
+    from bayeshaptic.recordings.columns import POSITIONS
+
     if found.of_a_response:
-        table.append("a table of a frequency response, read as it is: give --period-s SECONDS")
-    elif found.mapping is None:
-        needed = {"force": ("force",), "position": POSITIONS}
-        missing = [what for what, any_of in needed.items() if not set(any_of) & set(found.roles)]
-        was = "was" if len(missing) == 1 else "were"
-        table.append(f"no {' and '.join(missing)} {was} recognised; name them with --columns")
-        if len(missing) == 1:
-            table.append(f"a {missing[0]} that stands in another file: {_JOINED}")
-    else:
+        return ["a table of a frequency response, read as it is: give --period-s SECONDS"]
+    if found.mapping is not None:
         period = "" if "time" in found.roles else " --period-s SECONDS"
-        table.append(f"--columns {_quoted(printable(found.mapping))}{period}")
-    return table
+        return [f"--columns {_quoted(printable(found.mapping))}{period}"]
+    needed = {"force": ("force",), "position": POSITIONS}
+    missing = [what for what, any_of in needed.items() if not set(any_of) & set(found.roles)]
+    was = "was" if len(missing) == 1 else "were"
+    told = [f"no {' and '.join(missing)} {was} recognised; name them with --columns"]
+    if len(missing) == 1:
+        told.append(f"a {missing[0]} that stands in another file: {_JOINED}")
+    return told
 
 
 def _text_in(column: ColumnFacts, found: Overview) -> str | None:
@@ -146,32 +164,36 @@ def _quoted(text: str) -> str:
 
 def asked(found: Overview) -> str:
     """The mapping as somebody at the terminal wants it: a line each, empty for the guess."""
-    from bayeshaptic.recordings.columns import POSITIONS, parse_columns
-    from bayeshaptic.recordings.overview.overview import unit_of
+    from bayeshaptic.recordings.columns import POSITIONS
 
     guesses = dict(part.split("=", 1) for part in (found.mapping or "").split(",") if part)
     chosen: dict[str, str] = {}
     print("Which columns are these? NAME, NAME*FACTOR or NAME*FACTOR[UNIT]; empty for the guess.")
     motion = next((role for role in POSITIONS if role in found.roles), "position")
     for role in ("time", "force", motion):
-        while True:
-            term = _answer(f"  {role} [{printable(guesses.get(role, '-'))}]: ")
-            term = term or guesses.get(role, "")
-            if not term and role == "time":
-                break  # the period is given instead
-            try:
-                unit_of(found, role, term)
-                name, *others = (
-                    parse_columns({role: each})[role].names[-1] for each in (term, *chosen.values())
-                )
-                if name in others:
-                    raise InputError("this column has a role already")
-            except InputError as error:
-                print(f"  {printable(str(error))}")
-                continue
+        if term := _asked_for(role, guesses.get(role, ""), tuple(chosen.values()), found):
             chosen[role] = term
-            break
     return ",".join(f"{role}={term}" for role, term in chosen.items())
+
+
+def _asked_for(role: str, guess: str, taken: tuple[str, ...], found: Overview) -> str:
+    """The term for a role, asked until it can be read; empty where the period is given instead."""
+    from bayeshaptic.recordings.columns import parse_columns
+    from bayeshaptic.recordings.overview.overview import unit_of
+
+    while True:
+        term = _answer(f"  {role} [{printable(guess or '-')}]: ") or guess
+        if not term and role == "time":
+            return ""
+        try:
+            unit_of(found, role, term)
+            name, *others = (parse_columns({role: each})[role].names[-1] for each in (term, *taken))
+            if name in others:
+                raise InputError("this column has a role already")
+        except InputError as error:
+            print(f"  {printable(str(error))}")
+        else:
+            return term
 
 
 def _answer(question: str) -> str:

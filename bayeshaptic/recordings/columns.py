@@ -173,7 +173,13 @@ def _find(arrays: Arrays, name: str) -> str | None:
 
 
 def _unit_times(key: str, factor: float, role: str, path: Path) -> str | None:
-    """The unit that a header says, in brackets or as its end, of values times a factor."""
+    """The unit that a header says, in brackets or as its end, of values times a factor.
+
+    Raises
+    ------
+    InputError
+        Where the header says a multiple, as in mm, and nothing which unit the product is in.
+    """
     unit = name_and_unit(key)[1]
     ending = unit_in_name(role, key) if unit is None else None
     unit = unit or ending

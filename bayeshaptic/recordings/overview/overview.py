@@ -47,6 +47,15 @@ class Overview:
 
     A velocity or an acceleration stands for a position that no name tells of; a table of a
     frequency response has none of them.
+
+    Attributes
+    ----------
+    path : Path
+    columns : tuple of ColumnFacts
+    roles : mapping of str to str
+        The name of the column that plays each role.
+    arrays : mapping of str to ndarray
+        Everything in the file, by its name there.
     """
 
     path: Path
@@ -95,15 +104,17 @@ def overview(path: Path) -> Overview:
 
 
 def _facts(name: str, values: NDArray[Any]) -> ColumnFacts:
+    """What a column's numbers are like; of text and of fewer than three numbers nothing."""
     unit = name_and_unit(name)[1]
+    of_no_numbers = ColumnFacts(name, len(values), np.nan, np.nan, None, None, np.nan, unit)
     if values.dtype.kind not in "iufb":
-        return ColumnFacts(name, len(values), np.nan, np.nan, None, None, np.nan, unit)
+        return of_no_numbers
     most_rows = 500_000  # whose steps are looked at
     whole = np.asarray(values, dtype=float)
     there = np.isfinite(whole)
     signal = whole[:most_rows][there[:most_rows]]
     if len(signal) < 3:
-        return ColumnFacts(name, len(values), np.nan, np.nan, None, None, np.nan, unit)
+        return of_no_numbers
     steps = np.diff(signal)
     step = float(np.median(steps))
     even = 0.25  # of the period: what varies by more is time only by its name

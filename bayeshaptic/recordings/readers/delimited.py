@@ -94,28 +94,30 @@ def _text(path: Path) -> str:
             f"{path}: more than {MOST_TEXT // 1_000_000} MB of text; cut the recording, or save it "
             "as NPZ or HDF5"
         )
+    text = _decoded(content)
+    if "\0" in text:
+        raise InputError(f"{path}: not a text file; its name should end as its format does")
+    return text
+
+
+def _decoded(content: bytes) -> str:
+    """By the mark at its beginning, by where its zeros are, as UTF-8, or as Latin-1."""
     for mark, encoding in (
         (codecs.BOM_UTF16_LE, "utf-16"),
         (codecs.BOM_UTF16_BE, "utf-16"),
         (codecs.BOM_UTF8, "utf-8-sig"),
     ):
         if content.startswith(mark):
-            text = content.decode(encoding, "replace")
-            break
-    else:
-        # Latin letters in UTF-16 are every second byte.
-        if content[1:64:2].count(0) > 24:
-            text = content.decode("utf-16-le", "replace")
-        elif content[:64:2].count(0) > 24:
-            text = content.decode("utf-16-be", "replace")
-        else:
-            try:
-                text = content.decode("utf-8")
-            except UnicodeDecodeError:
-                text = content.decode("latin-1")
-    if "\0" in text:
-        raise InputError(f"{path}: not a text file; its name should end as its format does")
-    return text
+            return content.decode(encoding, "replace")
+    # Latin letters in UTF-16 are every second byte.
+    if content[1:64:2].count(0) > 24:
+        return content.decode("utf-16-le", "replace")
+    if content[:64:2].count(0) > 24:
+        return content.decode("utf-16-be", "replace")
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError:
+        return content.decode("latin-1")
 
 
 def _separator(lines: list[str]) -> str | None:
