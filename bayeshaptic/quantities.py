@@ -10,6 +10,7 @@ _PREFIXES = {-9: "n", -6: "\N{MICRO SIGN}", -3: "m", 0: "", 3: "k", 6: "M", 9: "
 _GRAMS = {-9: "\N{MICRO SIGN}g", -6: "mg", -3: "g", 0: "kg"}
 _PREFIXABLE = ("N", "A", "s", "m", "Hz")
 NOTHING = "\N{EN DASH}"  # where there is no number to write
+NINETY = 3.29  # standard deviations that a normal 90 % interval is wide
 _LONGEST = 12  # characters of a number: nine digits, a point, a sign and a zero
 _FAR_APART = 1e4  # ends of an interval under one prefix
 
@@ -146,8 +147,12 @@ class Rounded:
     @property
     def with_level(self) -> str:
         """As in ``"11.3 N m/rad (21.1 dB)"``."""
-        level = 20 * math.log10(self.value) if self.value > 0 else -math.inf
-        return f"{self.text} ({level:.1f} dB)"
+        return f"{self.text} ({decibel(self.value):.1f} dB)"
+
+
+def decibel(stiffness: float) -> float:
+    """20 log10 of a stiffness in SI units; minus infinity for zero."""
+    return 20 * math.log10(stiffness) if stiffness > 0 else -math.inf
 
 
 def rounded_down(
@@ -169,8 +174,7 @@ def rounded_down(
     stiffness, low, high = (value / lever_m**2 for value in (stiffness, low, high))
     if not (math.isfinite(stiffness) and stiffness > 0):
         return Rounded(stiffness, "any" if stiffness == math.inf else quantity(stiffness, unit))
-    width = 3.29  # of a normal 90 % interval, in standard deviations
-    sd = (high - low) / width
+    sd = (high - low) / NINETY
     exponent = math.floor(math.log10(stiffness))
     known = math.floor(math.log10(sd)) if 0 < sd < math.inf else exponent - 2
     step = 10.0 ** max(min(exponent - 2, known), exponent - 3)

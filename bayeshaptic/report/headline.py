@@ -8,15 +8,23 @@ from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.diagnosis.traced import UNEXPLAINED
-from bayeshaptic.quantities import estimate, percent, pretty_unit, pure, quantity, rounded_down
+from bayeshaptic.quantities import (
+    decibel,
+    estimate,
+    percent,
+    pretty_unit,
+    pure,
+    quantity,
+    rounded_down,
+)
 from bayeshaptic.recordings.feedback import has_feedback
 from bayeshaptic.recordings.units import is_assumed
 from bayeshaptic.report.loop.words import in_short
-from bayeshaptic.report.numbers.estimates import decibel, own_limit, read_off
+from bayeshaptic.report.numbers.estimates import HEADLINE_RISKS, own_limit, read_off
 from bayeshaptic.report.numbers.misfit import misfit_is_faint
 from bayeshaptic.report.numbers.result import is_unexplained, tip_limit
 from bayeshaptic.report.numbers.unstated import unstated
-from bayeshaptic.report.objections import HEADLINE_RISKS, why_none
+from bayeshaptic.report.objections import why_none
 from bayeshaptic.report.status import CAUTION, UNTRUSTED, status_of
 
 if TYPE_CHECKING:

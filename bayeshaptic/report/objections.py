@@ -24,6 +24,7 @@ from bayeshaptic.recordings.units import is_assumed
 from bayeshaptic.report.beside_command import beside_command, what_changes
 from bayeshaptic.report.beyond_band import beyond_band
 from bayeshaptic.report.in_closed_loop import in_closed_loop
+from bayeshaptic.report.numbers.estimates import HEADLINE_RISKS
 from bayeshaptic.report.numbers.held_still import held_still
 from bayeshaptic.report.numbers.misfit import (
     is_far_off,
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.diagnosis.closed import Closed
 
-HEADLINE_RISKS = (0.01, 0.05)
 _OPEN = 10.0  # times the lower end of the limit's 90 % interval: a median beyond that is open
 # Of the power of the response at the limit: from 0.28 on friction may be all of the damping there.
 # It is asked only where the noise of the device is flagged: in none of 60 clean recordings.
@@ -251,8 +251,8 @@ def _less_delay_s(analysis: Analysis) -> float | None:
 def is_open(analysis: Analysis) -> bool:
     """Whether the limit's 90 % interval reaches below a tenth of its median.
 
-    A rare crossing far below is no such case: its share of the draws is a probability.  So open was
-    one of 103 limits of recordings from another simulator (docs/door.md).
+    A rare crossing far below is no such case: its share of the draws is a probability.  Of 103
+    limits of recordings from another simulator one was that open (docs/door.md).
     """
     low, middle = (analysis.limit.quantile(p) for p in (0.05, 0.5))
     return bool(low * _OPEN < middle < math.inf)
@@ -280,10 +280,10 @@ def changes(closed: Closed) -> bool:
 def _rubs_otherwise(closed: Closed) -> bool:
     """Whether a force over the velocity stays unexplained: such a damping ends in small motions.
 
-    After a force was taken off a test's threshold is higher.  Where nobody holds the device what is
-    below it may be another force, which was looked for and not found: so it is of none of 17
-    recordings with one force or none, and of one of 18 with two.  In a loop that is fitted to all
-    lines what such a force would do to the limit is in its interval.
+    After a force was taken off, a test's threshold is higher.  Where nobody holds the device, what
+    is noticed below that threshold may be another force, which was looked for and not found: that
+    is so in none of 17 recordings with one force or none, and in one of 18 with two.  Where all
+    lines of a loop are fitted, the limit's interval holds what such a force would do to it.
     """
     left = _left(closed)
     acts = any(effect.family == "nonlinear" for effect in closed.effects)

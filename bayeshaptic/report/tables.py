@@ -10,6 +10,7 @@ import numpy as np
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.quantities import (
     NOTHING,
+    decibel,
     interval,
     minus,
     percent,
@@ -23,7 +24,7 @@ from bayeshaptic.quantities import (
 )
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.feedback import doubts, has_feedback
-from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel, finite, witnesses
+from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, finite, witnesses
 from bayeshaptic.report.numbers.result import tip_limit
 from bayeshaptic.report.numbers.rows import ParameterRow, Rows, scale_of
 from bayeshaptic.report.numbers.trust import doubtful_parameters

@@ -10,9 +10,9 @@ from scipy.special import bdtrc
 
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.diagnosis.traced import UNEXPLAINED
-from bayeshaptic.quantities import estimate, interval, percent, pure, quantity
+from bayeshaptic.quantities import decibel, estimate, interval, percent, pure, quantity
 from bayeshaptic.report.loop.motion_words import motion_words
-from bayeshaptic.report.numbers.estimates import Witness, correction, decibel, witnesses
+from bayeshaptic.report.numbers.estimates import Witness, correction, witnesses
 from bayeshaptic.report.numbers.misfit import misfit_factor, misfit_is_clear, residual_is_noticed
 from bayeshaptic.report.numbers.octaves import EXPECTED, third_octaves
 from bayeshaptic.report.numbers.result import families_of, is_unexplained

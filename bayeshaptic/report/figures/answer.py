@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.quantities import estimate, quantity, spread_of
+from bayeshaptic.quantities import decibel, estimate, quantity, spread_of
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.headline import headline
-from bayeshaptic.report.numbers.estimates import Witness, decibel, witnesses
+from bayeshaptic.report.numbers.estimates import Witness, witnesses
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

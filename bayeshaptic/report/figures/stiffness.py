@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayeshaptic.diagnosis.result import Result
-from bayeshaptic.quantities import Scale, scale
+from bayeshaptic.quantities import Scale, decibel, scale
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.histogram import BINS, risk_lines, stacked
-from bayeshaptic.report.numbers.estimates import Witness, decibel, own_limit, witnesses
+from bayeshaptic.report.numbers.estimates import Witness, own_limit, witnesses
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bayeshaptic.quantities import estimate, minus, pure, quantity, scale
-from bayeshaptic.report.numbers.estimates import decibel
+from bayeshaptic.quantities import decibel, estimate, minus, pure, quantity, scale
 from bayeshaptic.report.numbers.unstated import unstated
 
 if TYPE_CHECKING:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 QUANTILES = {"q05": 0.05, "q50": 0.5, "q95": 0.95}
 RISKS = (0.05, 0.01, 0.001)
+HEADLINE_RISKS = (0.01, 0.05)  # a stiffness is recommended at the first that the draws can state
 _OURS = "model, with its uncertainty"
 
 
@@ -43,11 +44,6 @@ class Witness:
     middle: float | None
     low: float | None = None
     high: float | None = None
-
-
-def decibel(stiffness: float) -> float:
-    """20 log10 of a stiffness in SI units; minus infinity for zero."""
-    return 20 * math.log10(stiffness) if stiffness > 0 else -math.inf
 
 
 def finite(value: Any) -> float | None:

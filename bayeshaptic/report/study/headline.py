@@ -10,6 +10,7 @@ from bayeshaptic.quantities import percent, quantity, rounded_down
 from bayeshaptic.report.headline import Headline, headline, sentence_of, warned_of
 from bayeshaptic.report.listed import listed
 from bayeshaptic.report.numbers.cases import is_free
+from bayeshaptic.report.numbers.estimates import HEADLINE_RISKS
 from bayeshaptic.report.numbers.result import is_unexplained
 from bayeshaptic.report.status import CAUTION, UNTRUSTED, status_of
 from bayeshaptic.report.study.words import missing
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 
 _Parts: TypeAlias = "Sequence[tuple[Analysed, Headline]]"  # recordings, and what their pages say
 
-RISKS = (0.01, 0.05)
 HOLDERS = {
     FREE: "nobody holds it",
     HELD: "one of these people holds it",
@@ -47,7 +47,7 @@ def study_headline(study: StudyAnalysis) -> Headline:
         )
         why = "Their own pages say why. What follows is for comparison only."
         return Headline(UNTRUSTED, sentence, (why,))
-    risk = next((r for r in RISKS if limit.safe(r) is not None), None)
+    risk = next((r for r in HEADLINE_RISKS if limit.safe(r) is not None), None)
     if risk is None:
         few = "the draws are too few to state a risk of 5 %"
         return Headline(UNTRUSTED, f"Do not ship a stiffness from this study: {few}.", ())

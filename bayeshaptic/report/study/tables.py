@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bayeshaptic.quantities import (
+    NINETY,
     NOTHING,
     Rounded,
+    decibel,
     interval,
     percent,
     pure,
@@ -18,7 +20,7 @@ from bayeshaptic.quantities import (
     scale,
 )
 from bayeshaptic.report.numbers.cases import has_draws, held_cases, raw_limits
-from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS, decibel
+from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS
 from bayeshaptic.report.numbers.hidden import amount
 from bayeshaptic.report.numbers.rows import Rows
 from bayeshaptic.report.numbers.titles import title_of
@@ -211,7 +213,7 @@ def population(found: Population) -> Rows:
         unit, title = found.model.unit(name), found.model.parameter(name).title
         low, middle, high = np.exp(np.quantile(found.log_mean[:, number], _LEVELS))
         row = scale((middle, high), unit)
-        spread = (high - low) / 3.29
+        spread = (high - low) / NINETY
         wide = 100 * np.quantile(found.log_sd[:, number], _LEVELS)
         rows.append(
             (

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bayeshaptic.quantities import estimate, percent, pure, rounded_down
+from bayeshaptic.quantities import NINETY, decibel, estimate, percent, pure, rounded_down
 from bayeshaptic.report.listed import listed
 from bayeshaptic.report.numbers.bands import band_of
 from bayeshaptic.report.numbers.cases import held_cases, is_free
-from bayeshaptic.report.numbers.estimates import decibel
 from bayeshaptic.report.numbers.hidden import amount
 from bayeshaptic.study.recorded_cases import place_of
 
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
     from bayeshaptic.study.analysis import StudyAnalysis
 
 _CONFIGURATION = ", configuration "
-Z90 = 3.29  # width of a normal 90 % interval in standard deviations
 
 
 def hands(study: StudyAnalysis) -> str:
@@ -145,7 +143,7 @@ def _place(case: Case) -> str:
 def spread_db(case: Case) -> float:
     """Standard deviation of a limit in dB, from its 90 % interval."""
     low, high = (decibel(case.limit.quantile(p)) for p in (0.05, 0.95))
-    return (high - low) / Z90 if math.isfinite(low) and math.isfinite(high) else math.inf
+    return (high - low) / NINETY if math.isfinite(low) and math.isfinite(high) else math.inf
 
 
 def hidden(study: StudyAnalysis) -> str:

@@ -17,6 +17,7 @@ from bayeshaptic.quantities import (
     scale,
 )
 from bayeshaptic.report.listed import listed
+from bayeshaptic.report.numbers.estimates import HEADLINE_RISKS
 from bayeshaptic.stability.tail import quantiles
 
 if TYPE_CHECKING:
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from bayeshaptic.stability.walls.limit_table import LimitTable
     from bayeshaptic.stability.walls.width import ZWidth
 
-_TOLD = (0.01, 0.05)  # the first of these risks that the draws can state
 _DAMPING = (
     "Damping B acts on a velocity that the controller makes from the positions it reads. Up to a "
     "point it makes a stiffer wall stable; beyond it the delay of that velocity makes the loop "
@@ -149,7 +149,7 @@ def _gain(part: FilterLimits, width: ZWidth, stiffness: float, table: LimitTable
 
 
 def _told(table: LimitTable) -> tuple[float | None, float | None]:
-    for risk in _TOLD:
+    for risk in HEADLINE_RISKS:
         if risk in table.risks:
             stiffness = table.stiffness[table.risks.index(risk)]
             if stiffness is not None:

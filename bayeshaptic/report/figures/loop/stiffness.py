@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from bayeshaptic.quantities import estimate
+from bayeshaptic.quantities import decibel, estimate
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.answer import level_rows
-from bayeshaptic.report.numbers.estimates import decibel, own_limit
+from bayeshaptic.report.numbers.estimates import own_limit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bayeshaptic.quantities import pretty_unit
+from bayeshaptic.quantities import decibel, pretty_unit
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.numbers.bands import Band, band_of
-from bayeshaptic.report.numbers.estimates import decibel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

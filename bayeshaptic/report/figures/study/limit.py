@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bayeshaptic.quantities import percent, pretty_unit
+from bayeshaptic.quantities import decibel, percent, pretty_unit
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.numbers.cases import is_free
-from bayeshaptic.report.numbers.estimates import decibel
 from bayeshaptic.stability.cases import CONFIGURATION, FREE, HELD, NEW_PERSON
 
 if TYPE_CHECKING:

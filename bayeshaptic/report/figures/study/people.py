@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.quantities import pretty_unit
+from bayeshaptic.quantities import decibel, pretty_unit
 from bayeshaptic.report.figures import style
 from bayeshaptic.report.figures.histogram import BINS, risk_lines, stacked
 from bayeshaptic.report.numbers.cases import has_draws, raw_limits
-from bayeshaptic.report.numbers.estimates import decibel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
