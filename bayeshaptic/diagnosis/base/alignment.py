@@ -25,19 +25,21 @@ from bayeshaptic.recordings.response.etfe import Etfe, compress
 from bayeshaptic.types import Floats
 
 MOVED, LESS_DELAY = "rows moved", "less delay"  # topics of notices
-# Of a sampling period: so much less delay than was told is no wrong number, but another instant: a
-# position that is read between two commands, a derivative that was integrated again and the mean of
-# two commands lead by half a period.  That of three filters, too, and leaves so little of what a
-# simpler model misfits by.  How often either is seen, and where it is not there: docs/door.md.
+# Where a recording shows less delay than was told by this share of a sampling period, force and
+# position of a row are not of one instant: a position that is read between two commands, one that
+# was differentiated and integrated again, and the mean of two commands lead by half a period.  The
+# mean of three commands filters, too: less delay then leaves no more than the second share of what
+# a simpler model misfits by.  How often either is seen, and where it is not there: docs/door.md.
 LESS, _REST = 0.25, 0.1
-# The reduced chi-square must fall to this share; rows of one sample hardly change it. How many of
-# those are moved nevertheless: docs/door.md.
+# The reduced chi-square must fall to this share: where a row is of one instant already, it hardly
+# falls. How many of those are moved nevertheless: docs/door.md.
 _FALLS = 0.9
 _WHOLE = 0.05  # of a period: so near to whole ones is one delay in ten
 LATER = "extra_delay_s"
-# Delays to begin at, and starting points beside: with one and none four of 60 fits to positions
-# that are early stay where they were, with four and none three do, with four and sixteen none: on
-# these they were chosen. What is moved though it is in time was counted before (docs/door.md).
+# Delays at which a fit to moved rows begins, and starting points of its own beside them. Of 60 fits
+# to early positions four stay where they were with one delay and no points, three with four delays
+# and no points, and none with four and sixteen: on these the numbers were chosen. How many rows are
+# moved that are in time was counted before (docs/door.md).
 _WAYS, _OWN = 4, 16
 
 
