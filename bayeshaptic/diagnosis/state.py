@@ -23,8 +23,8 @@ from bayeshaptic.types import Complexes, Floats
 
 # Windows are dealt out in turn: half of them to fit, a quarter to choose, a quarter to report on.
 FIT, CHOOSE, REPORT = (0, 2), (1,), (3,)
-# Where feedback hides the noise nothing can be held out: a window by itself is biased, and the sum
-# over all of them is not. A gain on all counts by what the quarter to choose by would have of it.
+# Under feedback nothing can be held out: a window by itself is biased, only the sum over all of
+# them is not. This share of a gain on all windows then counts as that on the quarter to choose by.
 _HELD_OUT = 0.25
 
 

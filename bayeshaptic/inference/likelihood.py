@@ -15,8 +15,8 @@ from bayeshaptic.numerics.spending import spend
 from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.types import Complexes, Floats
 
-# What a call costs, and a value of a model with dynamic links, in values of a rational model:
-# 0.4 ms and 0.15 to 0.3 us beside 12 to 25 ns.
+# What a call costs, and a value of a model with dynamic links, in units of one value of a rational
+# model: 0.4 ms, and 0.15 to 0.3 us, where that takes 12 to 25 ns.
 _CALL, _LINKED = 2e4, 10.0
 
 

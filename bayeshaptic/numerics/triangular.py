@@ -6,8 +6,8 @@ import numpy as np
 
 from bayeshaptic.types import Complexes
 
-# Of the largest diagonal: those below belong to columns that the ones before them make up for, and
-# their unknowns are zero.
+# Diagonals below this share of the largest belong to columns that depend on the ones before them;
+# the unknowns of these are zero.
 _LEAST = 1e-12
 
 

@@ -12,8 +12,8 @@ from bayeshaptic.report.numbers.result import may_be_held
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
 
-# Of the speed that the command makes: 46 clean devices that nobody holds, of two simulations, stay
-# below 0.03 (0.13 for a sweep of 2 s).
+# Speed that the command does not make, over that which it makes, from which a limit is in doubt. 46
+# clean devices of two simulations that nobody holds stay below 0.03 (0.13 under a sweep of 2 s).
 _BESIDES = 0.25
 _LATE = "commands take effect early or late"
 

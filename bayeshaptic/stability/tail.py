@@ -22,8 +22,8 @@ ENOUGH_BELOW = 20  # effective draws below a quantile that is stated as it is
 PRECISE = 0.2  # of the 90 % interval: a larger error of a fitted tail, and nothing is stated
 LARGEST = 0.05  # risk that a stiffness is stated for
 _SHARE = 0.05  # of the draws that a tail is fitted to; halved while it does not fit
-# Of sqrt(n) times the largest difference of distributions: 95 % of fits to eight smooth laws stay
-# below 0.9 to 1.1.
+# Most of sqrt(n) times the largest difference between the draws' distribution and the fitted one:
+# for eight smooth laws 95 % of fits stay below 0.9 to 1.1.
 _FITS = 1.3
 
 

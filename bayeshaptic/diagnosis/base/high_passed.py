@@ -32,8 +32,10 @@ from bayeshaptic.types import Floats
 TOPIC = "high-passed position"
 _BASES = ("rigid", "free", "grasped")  # a longer chain has valleys enough without a filter
 _CORNER = "high_pass_hz"
-# Of the position, by rms: 35 high-passed ones leave 0.003 to 0.058 of themselves; of five held ones
-# that looked filtered by their response, and were not, four leave 0.14 to 0.6 (docs/door.md).
+# Shares of the position, by rms: most that a filtered one leaves beside what the command does, and
+# most of what the model without a filter leaves. 35 high-passed positions leave 0.003 to 0.058 of
+# themselves; of five that were held, looked filtered by their response and were not, four leave
+# 0.14 to 0.6 (docs/door.md).
 _LITTLE, _HALF = 0.1, 0.5
 _ROUNDED = 1e-3  # of a power of ten, as a logarithm
 _LOG_SD = 1.5  # of the corner, around the lower end of the band: it only bounds the search

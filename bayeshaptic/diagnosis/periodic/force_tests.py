@@ -34,8 +34,9 @@ from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Complexes, Floats
 
-# Of a wave over a period, at all rates: 0.3 GB on the way. A period of 7,500 samples leaves all
-# rates, one of 30,000 those of 25 periods along the way; of longer ones few are looked at.
+# Most values of waves over a period, all rates together: 0.3 GB in between. For a period of 7,500
+# samples that is all rates, for one of 30,000 those up to 25 periods along the way; for longer ones
+# few rates are looked at.
 _MOST_VALUES = 3_000_000
 
 

@@ -23,8 +23,8 @@ from bayeshaptic.numerics.polynomials.polynomial import evaluate
 from bayeshaptic.numerics.spending import spend
 from bayeshaptic.types import Complexes, Floats
 
-# What it costs to set one up and evaluate it some times, a sample of a period, in values of a
-# rational model.
+# Cost of setting up responses and evaluating them some times, for each sample of a period, in units
+# of one value of a rational model.
 _COST = 25.0
 
 

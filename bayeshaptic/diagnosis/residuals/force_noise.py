@@ -19,8 +19,9 @@ _OFF_DB = 0.3  # what a hold, and a command that comes late, do to the spectrum
 # So many noises of a force are not known as such at least, and widen the limit as others do.
 _MISSED = 0.01
 _SPAN = 2.0  # from the lowest to the highest frequency where it is louder than all else together
-# Of the command's power.  Friction that holds a mass most of the time makes noise of 0.2 to 10
-# times it; commands that come 0.3 of a period early or late, of 0.06 to 0.09.
+# Most power of such a force, over the command's.  Friction that holds a mass most of the time makes
+# noise of 0.2 to 10 times the command's power; commands that come 0.3 of a period early or late
+# make 0.06 to 0.09 of it.
 _MOST = 0.1
 
 

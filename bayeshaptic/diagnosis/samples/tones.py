@@ -24,13 +24,13 @@ from bayeshaptic.types import Complexes, Floats
 Indices = NDArray[np.intp]
 
 _HALF = 20  # lines to each side
-# Of the position's rms, what rounding in double precision may leave after a simulation: a recording
+# What rounding in double precision may leave of a simulated position, over its rms: a recording
 # without noise has tones of a hundredth of that.
 _ROUNDING = 1e-9
-# Power of the force at a line, over the median of those around it, from where on what is left there
-# may be a response that is not quite the device's: sweeps that nearly repeat have tones in 27 of 40
-# without this rule and in none with it; a hum is seen in 25 of 40, in 39 without.  Noise reaches it
-# at a line in a million.
+# Where the power of the force at a line is more than this many times the median of those around it,
+# what is left there may be a response that is not quite the device's, and is no tone.  Sweeps that
+# nearly repeat have tones in 27 of 40 without this rule, and in none with it; a hum is seen in 39
+# of 40 without it, and in 25 with it.  Noise reaches it at a line in a million.
 _PEAK = 20.0
 
 

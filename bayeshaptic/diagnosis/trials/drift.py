@@ -29,12 +29,14 @@ from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats
 
 PARTS = 3
-# Of what parts were off by, in reduced chi-squares over one: in the 11 recordings that this was
-# chosen on, drifts of another kind leave 0.10 to 1 of it; the right ones at most 0.06 and less than
-# noise, but for a step within a part (0.13, more than noise: refused). Rates are not counted.
+# Share of the parts' misfit (reduced chi-squares above one) that a drift may leave. In the 11
+# recordings that this was chosen on, drifts of the wrong kind leave 0.10 to 1 of it; the right ones
+# leave at most 0.06, and less than noise, but for a step within a part (0.13, and more than noise:
+# refused). Rates are not counted.
 _LEFT = 0.3
-# Of the score of a change over the recording, what a steadied one has yet: at most 0.05 in 60 whose
-# gain drifts (of 50 to 50,000); 0.23 to 0.87 in 16 whose damper does and a gain convinces.
+# Share of the drift test's statistic that a steadied gain may leave: it leaves at most 0.05 in 60
+# recordings whose gain drifts (statistics of 50 to 50,000), and 0.23 to 0.87 in 16 whose damper
+# drifts, where a drift of the gain convinces all the same.
 _UNSTEADY = 0.1
 _KNOWN = 1.0  # log change from part to part: a parameter with more is one that parts do not see
 

@@ -23,9 +23,10 @@ from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.response.etfe import compress
 
-# Of how far the tests of a force stand out, those of the response: 0.04 and 0.26 in recordings in
-# which a force alone was left, 0.98 to 120 in nine in which a linear effect acted as well; but 5.7
-# with Dahl's friction, a spring at first: what it was taken for goes again when it is found.
+# Excess of the linear tests over that of the tests of a force, from which the response is bent by
+# more than a force. It is 0.04 and 0.26 in recordings in which a force alone was left, and 0.98 to
+# 120 in nine in which a linear effect acted as well; but 5.7 with Dahl's friction, which is a
+# spring at first: the effect that it was taken for is taken out again when the friction is found.
 _AS_FAR = 0.5
 
 

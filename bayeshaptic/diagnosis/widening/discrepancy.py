@@ -28,6 +28,7 @@ from bayeshaptic.stability.binding import as_known, binding_kinds, group_crossin
 from bayeshaptic.stability.critical import CriticalStiffness, critical_stiffness
 from bayeshaptic.types import Complexes, Floats
 
+# Log stiffness that a remainder of each class widens the limit by at least.
 _LEAST = {"nonlinear": 0.12, "time-varying": 0.12, "measurement": 0.03}
 
 
@@ -40,7 +41,17 @@ def with_discrepancy(
 ) -> CriticalStiffness:
     """The limit with the spread of accepted effects and of what is unexplained.
 
-    `base` is the fit of the model as declared; that with the accepted effects is in `traced`.
+    Parameters
+    ----------
+    limit : CriticalStiffness
+        Of the model with the accepted effects.
+    posterior : Posterior
+        Whose draws it is of.
+    base : Fit
+        Of the model as declared.
+    traced : Traced
+        With the fit of the accepted effects, and what is left.
+    seed : int
     """
     rng = np.random.default_rng(seed)
     limit = _with_effects(limit, traced, rng)

@@ -19,11 +19,11 @@ from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from bayeshaptic.types import Floats
 
-# Of the way.  At the true parameters of that LHIfAM noise around the resonance is 3 dB louder than
-# the encoder's; 4.6 dB with 0.15, where motions part, and 3.6 dB with 0.5, where the encoder's
-# noise moves the masses.
+# Share of the way to the measured motion.  At the true parameters of that LHIfAM, noise around the
+# resonance is 3 dB louder than the encoder's. With a share of 0.15, where motions part, it is 4.6
+# dB louder; with 0.5, where the encoder's noise moves the masses, 3.6 dB.
 _PART = 0.3
-_SLOW_HZ = 10.0
+_SLOW_HZ = 10.0  # motion that is slower is not drawn
 
 
 def correction(besides: Floats, period_s: float) -> Floats:

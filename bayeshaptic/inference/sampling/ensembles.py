@@ -20,10 +20,10 @@ ENSEMBLES = 4
 WALKERS = 64
 _WARM_UP = (2, 2, 4, 4, 6, 6, 6, 6)  # steps a parameter in each round
 _IDLE = 2  # rounds without a gain
-# Of the moves that are independent proposals; the others are differences, which help where the
-# proposal misses something and gain little elsewhere.
+# Share of moves that are independent proposals, in the warm-up and after it; the others are
+# differences, which help where the proposal misses something and gain little elsewhere.
 _WARM, _FROZEN = 0.6, 0.95
-_TOGETHER = 0.8  # of those over several peaks, where proposals miss more
+_TOGETHER = 0.8  # the same over several peaks, where proposals miss more
 
 
 P = TypeVar("P", Proposal, SeveralPeaks)

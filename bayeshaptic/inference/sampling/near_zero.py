@@ -2,9 +2,9 @@
 
 The prior `NearZero` has as much probability on every scale, `MaybeZero` a spike, and a damper of
 which nobody knows anything may be a hundredth of what it seems: only a logarithm shows all of it.
-But what the data know, sums of dampers before all, are lines in the natural
-values, hundreds of times longer than they are thick, and a logarithm would bend them.  So the
-others are measured from where they follow the small one to.
+But what the data know, sums of dampers before all, are lines in the natural values, hundreds of
+times longer than they are thick, and a logarithm would bend them.  So the other coordinates are
+measured from where they follow the small one to.
 """
 
 from __future__ import annotations

@@ -19,15 +19,16 @@ from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.numerics.mixture import StudentMixture
 from bayeshaptic.types import Floats, LogDensity
 
-# Of 24 held PHANToMs without a file (values changed by e^0.8, 12 s) 90 % intervals hold 216 of 264
-# parameters and 21 limits, about one peak 190 and 19; with how many, how idle and how slight, and
-# with what fits about as well, at half and twice their sizes 216 to 218 and 19 to 22.
+# With these numbers 90 % intervals hold 216 of 264 parameters and 21 of 24 limits of held PHANToMs
+# without a file (values changed by e^0.8, 12 s); about one peak alone they hold 190 and 19. With
+# half or twice as many peaks or idle ones, and half or twice of what is slight or fits about as
+# well (`inference/valleys.py`), they hold 216 to 218 and 19 to 22.
 _MOST = 6  # peaks
 _IDLE = 2  # that turn out to be none, after which no more are looked for
 _SHARED = 0.5  # of walkers that lie where others have been: it is their peak
 _LOOKED_AT = 12  # ends of the fit, by their densities
-# Log of a peak's probability below the largest, from which on it is left out: as its draws say, and
-# as those of Laplace's approximation do, which miss most of a bent one.
+# A peak is left out where the log of its probability is this far below the largest: by its own
+# draws, and by Laplace's approximation, which misses most of a bent peak.
 _SLIGHT, _TOO_SLIGHT = 7.0, 14.0
 
 

@@ -21,8 +21,9 @@ from bayeshaptic.recordings.response.frf_kinds import of_a_hold
 from bayeshaptic.types import Complexes, Floats
 
 _POINTS = 400  # of the smooth function
-# Of the Nyquist frequency.  Below the lowest the function is what it is there; above the highest it
-# is left out: the command that stands for a measured force vanishes at that frequency itself.
+# Range of the function, over the Nyquist frequency.  Below it the function keeps its value at the
+# lower end; above it is left out: the command that stands for a measured force vanishes at the
+# Nyquist frequency itself.
 _LOWEST, _HIGHEST = 1e-3, 0.95
 
 

@@ -11,7 +11,7 @@ from bayeshaptic.types import Floats
 
 _FEWEST, _MOST = 3, 7  # significant digits
 _EXACT = 1e-9  # of a number that has no more digits
-# Of the rows, whose steps are larger than what the device moves in one. How often that is so:
+# Least share of rows that are written in the coarsest steps. How often such recordings occur:
 # docs/door.md.
 _SHARE = 0.02
 

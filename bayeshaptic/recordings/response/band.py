@@ -15,13 +15,15 @@ from bayeshaptic.recordings.response.spectra import RandomSpectra
 # A force that fell by more within an octave was cut off there: 13 dB is more than what a
 # second-order filter does, less than a third-order one.
 CUT_OFF = 20.0
-# Times the power where it fell: more farther out is no noise (6 dB; windows of 24 lines scatter by
-# one, and the highest of many by three).  Of 160 recordings of strangers three have another band.
+# Where the power beyond a fall is this many times what it fell to, it is no noise but more signal.
+# That is 6 dB: windows of 24 lines scatter by 1 dB, and the highest of many by 3 dB.  It changes
+# the band of three of 160 strangers' recordings.
 _RISEN = 4.0
 # Power, relative to the strongest or the mean, below which there is nothing but rounding.
 NO_POWER = 1e-10
-# Of the sampling rate: there what lies between the samples of a velocity is a quarter of the loop's
-# response, and at 0.44 most of it. Fits to what a model makes of that are fits to itself.
+# Highest frequency at which a velocity is used, over the sampling rate. There a quarter of the
+# loop's response is what lies between the samples of the velocity, and at 0.44 it is most of it:
+# that part a model must supply, and would be fitted to itself.
 _OF_A_VELOCITY = 0.3
 # Windows on each side that are judged together, so that an antiresonance or one noisy window does
 # not end the range.

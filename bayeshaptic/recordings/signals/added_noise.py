@@ -22,9 +22,10 @@ from bayeshaptic.types import Floats
 
 _LAGS = 20  # of command and position: a controller with its filters, and a few modes
 _AT_ONCE = 20_000  # samples: an hour of them is large
-# Of the command's standard deviation: less is what encoder and logger make of a law of the motion,
-# or the little that the past of a smooth reference leaves open.  Of 96 loops to whose command
-# nothing was added 25 leave more, all of references that step, and those steps are new.
+# Least size of innovations that count, over the command's standard deviation. Less is what encoder
+# and logger make of a law of the motion, or the little that the past of a smooth reference leaves
+# open.  Of 96 loops to whose command nothing was added, 25 leave more: all have references that
+# step, and a step is new.
 _LEAST = 0.1
 
 

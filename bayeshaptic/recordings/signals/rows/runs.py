@@ -19,12 +19,14 @@ _FEWEST_CHANGES = 100
 _FEWEST_AT_REST, _LEAST_AT_REST = 100, 0.02  # rows of a standstill, and their share
 _AS_FAR = 0.5  # as a force pushes a mass where it moves; under less a device may just rest
 _MOST_TIMES = 20  # that a row is written
-# Of two clocks that beat: rows a change at most (beyond, `held_for` allows for slips), beats in a
-# block of changes, blocks at least, their share that is as long as the others to a row, and the
-# scatter of the steps over their mean (a ramp in counts of a converter has none).  Of 488
-# recordings it shows in 20, which all have such a clock; those that are missed: docs/door.md.
+# Two clocks that beat are seen by changes of the signal at a steady mean distance in rows: at most
+# so many rows a change (beyond that `held_for` allows for slips), so many beats in a block of
+# changes, so many blocks, this share of them alike to a row, and steps that scatter by this share
+# of their mean (a ramp in counts of a converter does not scatter).  Of 488 recordings 20 show it,
+# all of which have such a clock; those that are missed: docs/door.md.
 _MOST_UNEVEN, _BEATS, _FEWEST_BLOCKS, _MOSTLY, _STEPS_VARY = 4.0, 8, 10, 0.9, 0.1
-# That a position stands wherever the force does; and rows that two oscillators are apart at most.
+# Chance that a position would stand by itself wherever the force does; and how many rows two
+# oscillators drift apart at most.
 _BY_CHANCE, _OFF = 1e-9, 3.0
 
 
