@@ -42,8 +42,9 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.closed import Closed
 
 _OPEN = 10.0  # times the lower end of the limit's 90 % interval: a median beyond that is open
-# Of the power of the response at the limit: from 0.28 on friction may be all of the damping there.
-# It is asked only where the noise of the device is flagged: in none of 60 clean recordings.
+# Share of the response's power that changes from moment to moment at the limit, up to which a
+# stiffness is recommended: from 0.28 on friction may be all of the damping there. It is asked only
+# where the noise of the device is flagged: in none of 60 clean recordings.
 _CHANGES = 0.25
 _NO_LAW = {
     GAIN.test: "the gain of the actuator ripples along the way, which was not taken off, and where "

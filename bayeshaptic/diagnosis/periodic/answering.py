@@ -18,8 +18,8 @@ from bayeshaptic.types import Complexes, Floats
 
 STEP = 1e-5
 """Of a coordinate, and of the rms of a motion."""
-# What an answer costs, a number of the motion, in values of a rational model: measured, as is that
-# of a steady motion.
+# Cost of an answer, for each number of the motion, in units of one value of a rational model:
+# measured, as is that of a steady motion.
 _COST = 50.0
 _EXACT, _TERMS = 1e-3, 30  # of the change of a motion, solved for in a Krylov space
 

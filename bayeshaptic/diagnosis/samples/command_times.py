@@ -33,8 +33,9 @@ _ROWS = (2, 3, 4, 5, 8, 10)
 # None of the numbers below decides: with half or twice of each (0.4 or 0.49 of the rate) all of 36
 # simulated recordings with late commands are named, and none of 36 others.
 _LINES, _FEWEST = 30, 8  # lines in a window, and windows
-# Times the band: late commands make noise beyond it, too, and noise makes the band narrow. Hz,
-# below which a hand moves a device; and of the rate, above which a filter of the log's would cut.
+# How many times as wide as the band is what is looked at: late commands make noise beyond it, too,
+# and noise makes the band narrow. The frequency below which a hand moves a device, and the share of
+# the sampling rate above which a filter of the log's would cut.
 _WIDER, _LOWEST_HZ, _OF_THE_RATE = 3.0, 5.0, 0.45
 _TAPER = 0.05  # of the recording, at both ends together
 _BLOCKS = 60  # of samples, whose noise may be alike

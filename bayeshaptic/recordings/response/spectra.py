@@ -19,8 +19,9 @@ from bayeshaptic.recordings.response.local_polynomial import (
 from bayeshaptic.recordings.response.regressors import Block, regressors
 from bayeshaptic.recordings.response.windows import Reference, Windows
 
-# Of a line: no device repeats itself to more, and windows and models promise no more. Simulated
-# recordings with an encoder reach 7e-5 in their best window; what is closer counts as this far.
+# Least relative error of a line: no device repeats itself better, and windows and models promise no
+# better. Simulated recordings with an encoder reach 7e-5 in their best window; a smaller error
+# counts as this one.
 REPEATS_TO = 1e-5
 
 

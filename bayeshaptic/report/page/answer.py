@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
     from bayeshaptic.report.numbers.rows import Rows
 
-# Of benchmarks/README.md: how often 90 % intervals of K_CR held the truth of simulated recordings,
-# and of how many; a test compares them.
+# How many per cent of 90 % intervals of K_CR held the truth of simulated recordings, and of how
+# many, by the verdict. A test compares them with benchmarks/README.md.
 FARED = {
     "consistent": (86, 200, "with nothing beside the model"),
     "explained": (89, 150, "with an effect of the library"),
