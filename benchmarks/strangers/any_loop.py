@@ -26,8 +26,15 @@ from benchmarks.strangers.any_device import (
     main,
     size_in_periods,
 )
-from benchmarks.strangers.draw import UNITS, Case, Draw, as_logged, base_of, effects_of, states_of
-from benchmarks.strangers.loops import LAGS, REFERENCES, declared, law_of, simulated, wanted_of
+from benchmarks.strangers.draw import UNITS, Case, Draw, as_logged, effects_of, states_of
+from benchmarks.strangers.loops import (
+    REFERENCES,
+    known_of,
+    law_of,
+    simulated,
+    wanted_of,
+    with_loop_told,
+)
 
 
 def make(seed: int, clean: bool = False) -> Case | None:
@@ -61,28 +68,18 @@ def make(seed: int, clean: bool = False) -> Case | None:
     count = count if "coarse" in effects else law.count
     position = count * np.round(position / count)
     recording = Recording(force, position, period_s, *UNITS[draw.like], f"any-loop-{seed}")
-    base, parameters = base_of(draw.values)
+    base, parameters = known_of(draw, effects, delay_s, friction_force)
     told: dict[str, Any] = {"held": draw.held} if rng.random() < 0.6 else {}
     if rng.random() < 0.5:
         told["model"] = base
     if "late" not in effects and rng.random() < 0.4:
         told["delay_s"] = delay_s
-    also: list[str] = []
-    if rng.random() < 0.3:
-        recording, also = replace(recording, reference=wanted), ["reference"]
-    elif np.isinf(law.most) and rng.random() < 0.3:
-        recording, also = replace(recording, feedback=declared(law, period_s)), ["controller"]
+    recording, also = with_loop_told(rng, recording, law, wanted)
     what = (
         f"{len(draw.values['m'])} masses {'held' if draw.held else 'free'}, {mass:.1e}, "
         f"{1e3 * period_s:.3g} ms, {len(force)} samples, {name}, {kind}, "
         f"told {', '.join([*told, *also]) or 'nothing'}"
     )
-    if base == "rigid" and not set(effects) & LAGS:
-        parameters["delay_s"] = delay_s
-    if base == "rigid" and set(effects) & {"warming up", "eddy"}:
-        del parameters["b"]  # it is not one number
-    if base == "rigid" and "coulomb" in effects:
-        parameters["coulomb"] = friction_force
     return Case(recording, told, what, effects, truth, base, parameters)
 
 

@@ -17,6 +17,7 @@ so: which parameters are told, and how often their 90 % intervals hold the truth
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -94,14 +95,30 @@ def make(seed: int) -> Case | None:
         told["model"] = base_of(draw.values)[0]
     if "late" not in effects and ("device" in told or rng.random() < 0.4):
         told["delay_s"] = delay_s
-    also: list[str] = []
-    if law is not None and rng.random() < 0.3:
-        recording, also = replace(recording, reference=wanted), ["reference"]
-    elif law is not None and np.isinf(law.most) and rng.random() < 0.3:
-        recording, also = replace(recording, feedback=declared(law, period_s)), ["controller"]
+    also: tuple[str, ...] = ()
+    if law is not None:
+        recording, also = with_loop_told(rng, recording, law, wanted)
     known = ", ".join([*told, *also]) or "nothing"
     masses = len(draw.values["m"])
     what = f"{draw.kind} {masses}, {name}, {kind}, {seconds:.1f} s, told {known}"
+    return Case(recording, told, what, effects, truth, *known_of(draw, effects, delay_s, friction))
+
+
+def with_loop_told(
+    rng: np.random.Generator, recording: Recording, law: Law, wanted: Array
+) -> tuple[Recording, tuple[str, ...]]:
+    """The recording with its reference, or its controller declared, or neither; and which."""
+    if rng.random() < 0.3:
+        return replace(recording, reference=wanted), ("reference",)
+    if np.isinf(law.most) and rng.random() < 0.3:
+        return replace(recording, feedback=declared(law, recording.period_s)), ("controller",)
+    return recording, ()
+
+
+def known_of(
+    draw: Draw, effects: Sequence[str], delay_s: float, friction: float
+) -> tuple[str, dict[str, float]]:
+    """The base model, and the true values of its parameters that are one number each."""
     base, parameters = base_of(draw.values)
     if base == "rigid" and not set(effects) & LAGS:
         parameters["delay_s"] = delay_s
@@ -109,7 +126,7 @@ def make(seed: int) -> Case | None:
         del parameters["b"]  # it is not one number
     if base == "rigid" and "coulomb" in effects:
         parameters["coulomb"] = friction
-    return Case(recording, told, what, effects, truth, base, parameters)
+    return base, parameters
 
 
 def law_of(draw: Draw, truth: float, period_s: float, longer: float = 1.0) -> tuple[Law, str]:
