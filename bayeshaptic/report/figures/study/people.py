@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
     from bayeshaptic.stability.cases import Case
     from bayeshaptic.study.analysis import StudyAnalysis
 
+# How a person's bar looks: of the own recording alone, and given all people.
+_ALONE = {"fmt": "s", "color": style.DATA, "markerfacecolor": "white", "markersize": 3.5}
+_ALONE |= {"linewidth": 1.0}
+_GIVEN_ALL = {"fmt": "o", "color": style.MODEL, "markersize": 4.0, "linewidth": 1.8}
 _LABEL = 30  # characters of a line in the legend
 _NARROWEST_DB = 0.2  # of the axis: a population that does not differ is not to look as if it did
 
@@ -100,9 +105,9 @@ def _users(axes: Axes, study: StudyAnalysis) -> None:
     alone = raw_limits(study)
     for place, case in enumerate(study.users):
         for limit in alone[case.label]:
-            _bar(axes, limit, place + 0.17, "s", style.DATA, "white", 3.5, 1.0)
+            _bar(axes, limit, place + 0.17, _ALONE)
         if has_draws(case):
-            _bar(axes, case.limit, place - 0.17, "o", style.MODEL, style.MODEL, 4.0, 1.8)
+            _bar(axes, case.limit, place - 0.17, _GIVEN_ALL)
     names = [style.called(case.label.removeprefix("user ")) for case in study.users]
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(max(len(names), 1) - 0.4, -0.6)
@@ -112,16 +117,7 @@ def _users(axes: Axes, study: StudyAnalysis) -> None:
     style.legend(axes, loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.4)
 
 
-def _bar(
-    axes: Axes,
-    limit: Any,
-    place: float,
-    marker: str,
-    colour: str,
-    face: str,
-    size: float,
-    width: float,
-) -> None:
+def _bar(axes: Axes, limit: Any, place: float, look: Mapping[str, Any]) -> None:
     """Median and 90 % interval of a limit in dB."""
     low, middle, high = (decibel(limit.quantile(p)) for p in (0.05, 0.5, 0.95))
     if not np.isfinite([low, middle, high]).all():
@@ -130,10 +126,6 @@ def _bar(
         [middle],
         [place],
         xerr=[[middle - low], [high - middle]],
-        fmt=marker,
-        color=colour,
-        markerfacecolor=face,
-        markersize=size,
-        linewidth=width,
         capsize=2.5,
+        **look,
     )
