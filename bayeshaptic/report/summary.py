@@ -22,8 +22,10 @@ from bayeshaptic.version import __version__
 
 if TYPE_CHECKING:
     from bayeshaptic.diagnosis.analysis import Analysis
+    from bayeshaptic.stability.cases import DeviceLimit
     from bayeshaptic.stability.critical import CriticalStiffness
     from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness
+    from bayeshaptic.stability.limit_draws import LimitDraws
 
 _ERROR = {
     "weighted_rms": None,
@@ -216,20 +218,14 @@ def _critical_stiffness(result: Result) -> dict[str, Any]:
         }
     return {
         "unit": limit.unit,
-        **_quantiles(limit),
-        "db": {name: limit.db(p) for name, p in QUANTILES.items()},
+        **quantiles_of(limit),
+        "db": decibels_of(limit),
         "frequency_hz": _frequency(limit),
-        "tip": None if tip is None else {"unit": tip.unit, **_quantiles(tip)},
-        "crossings": [
-            {"label": c.label, "frequency_hz": c.frequency_hz, "probability": c.probability}
-            for c in limit.crossings
-        ],
+        "tip": None if tip is None else {"unit": tip.unit, **quantiles_of(tip)},
+        "crossings": crossings_of(limit),
         **measured,
-        "safe": {f"{risk:g}": limit.safe(risk) for risk in RISKS},
-        "declared": {
-            **_quantiles(analysis.declared),
-            "db": {name: analysis.declared.db(p) for name, p in QUANTILES.items()},
-        },
+        "safe": safe_of(limit),
+        "declared": {**quantiles_of(analysis.declared), "db": decibels_of(analysis.declared)},
         "reason": None,
     }
 
@@ -270,8 +266,27 @@ def recommendation(head: Headline) -> dict[str, Any]:
     }
 
 
-def _quantiles(limit: CriticalStiffness) -> dict[str, Any]:
+def quantiles_of(limit: LimitDraws) -> dict[str, Any]:
+    """Quantiles of a limit by their keys."""
     return {name: limit.quantile(p) for name, p in QUANTILES.items()}
+
+
+def decibels_of(limit: LimitDraws) -> dict[str, Any]:
+    """The same in decibels."""
+    return {name: limit.db(p) for name, p in QUANTILES.items()}
+
+
+def safe_of(limit: CriticalStiffness | DeviceLimit) -> dict[str, Any]:
+    """The stiffness at each risk by its key, null where the draws do not state it."""
+    return {f"{risk:g}": limit.safe(risk) for risk in RISKS}
+
+
+def crossings_of(limit: CriticalStiffness) -> list[dict[str, Any]]:
+    """Which crossing binds, where, and with what probability."""
+    return [
+        {"label": c.label, "frequency_hz": c.frequency_hz, "probability": c.probability}
+        for c in limit.crossings
+    ]
 
 
 def _frequency(limit: CriticalStiffness) -> dict[str, Any]:

@@ -9,9 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bayeshaptic.inference.population.reweighting import ALONE
-from bayeshaptic.report.numbers.estimates import QUANTILES, RISKS
+from bayeshaptic.report.numbers.estimates import QUANTILES
 from bayeshaptic.report.study.headline import study_headline
-from bayeshaptic.report.summary import plain, recommendation
+from bayeshaptic.report.summary import (
+    crossings_of,
+    decibels_of,
+    plain,
+    quantiles_of,
+    recommendation,
+    safe_of,
+)
 from bayeshaptic.stability.tail import quantiles
 from bayeshaptic.types import Floats
 
@@ -122,13 +129,10 @@ def _new_person(study: StudyAnalysis) -> dict[str, Any] | None:
 def _limit(limit: CriticalStiffness) -> dict[str, Any]:
     return {
         "unit": limit.unit,
-        **_quantiles(limit.samples),
-        "db": {name: limit.db(p) for name, p in QUANTILES.items()},
-        "safe": {f"{risk:g}": limit.safe(risk) for risk in RISKS},
-        "crossings": [
-            {"label": c.label, "frequency_hz": c.frequency_hz, "probability": c.probability}
-            for c in limit.crossings
-        ],
+        **quantiles_of(limit),
+        "db": decibels_of(limit),
+        "safe": safe_of(limit),
+        "crossings": crossings_of(limit),
     }
 
 
@@ -161,8 +165,8 @@ def _configurations(study: StudyAnalysis) -> list[dict[str, Any]] | None:
 def _device_limit(limit: DeviceLimit) -> dict[str, Any]:
     return {
         "unit": limit.unit,
-        **_quantiles(limit.samples),
-        "safe": {f"{risk:g}": limit.safe(risk) for risk in RISKS},
+        **quantiles_of(limit),
+        "safe": safe_of(limit),
         "binding": [{"case": b.case, "probability": b.probability} for b in limit.binding],
     }
 
