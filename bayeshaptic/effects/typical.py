@@ -27,6 +27,12 @@ def place_of(name: str, mechanism: Mechanism) -> int:
     return mechanism.hand
 
 
+def device_mass(model: Model, theta: Floats) -> float:
+    """Mass of a device without a hand, as its model with the values `theta`, shape (P,), has it."""
+    values = dict(zip(model.names, theta, strict=True))
+    return float(values.get("m", values.get("m1", 0.0) + values.get("m2", 0.0)))
+
+
 @dataclass(frozen=True)
 class Typical:
     """Prior medians of a model's parameters, and what of the measurement sets a scale.

@@ -19,6 +19,7 @@ from bayeshaptic.effects.nonlinear.shapes import (
     Usual,
 )
 from bayeshaptic.effects.registry import register
+from bayeshaptic.effects.typical import device_mass
 from bayeshaptic.models import Model
 
 FAINT_TO_STRONG = np.array([0.003, 0.01, 0.03, 0.1, 0.3])  # over the force scale
@@ -26,10 +27,8 @@ FAINT_TO_STRONG = np.array([0.003, 0.01, 0.03, 0.1, 0.3])  # over the force scal
 
 def force_scale(model: Model, theta: Floats, motion: Motion) -> float:
     """The force that viscous damping of the motion would take: what friction hides as."""
-    values = dict(zip(model.names, theta, strict=True))
-    mass = values.get("m", values.get("m1", 0.0) + values.get("m2", 0.0))
     corner_hz = 3.0  # b / (2 pi m) of a usual device
-    return float(mass * motion.velocity.std() * 2 * np.pi * corner_hz)
+    return float(device_mass(model, theta) * motion.velocity.std() * 2 * np.pi * corner_hz)
 
 
 def _against(v: Floats) -> Floats:

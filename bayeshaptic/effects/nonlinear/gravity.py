@@ -12,6 +12,7 @@ from bayeshaptic.effects.nonlinear.internal_force import MOTOR, Law, Place
 from bayeshaptic.effects.nonlinear.protocol import Floats, Motion, NonlinearEffect
 from bayeshaptic.effects.nonlinear.shapes import POSITION, Shape, Usual
 from bayeshaptic.effects.registry import register
+from bayeshaptic.effects.typical import device_mass
 from bayeshaptic.models import Model
 
 _TURN = 2 * math.pi
@@ -59,9 +60,7 @@ class Gravity(NonlinearEffect):
         )
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
-        values = dict(zip(model.names, theta, strict=True))
-        mass = values.get("m", values.get("m1", 0.0) + values.get("m2", 0.0))
-        return np.asarray(mass * (_TURN * _SLOW_HZ) ** 2)
+        return np.asarray(device_mass(model, theta) * (_TURN * _SLOW_HZ) ** 2)
 
     def law(self, strength: float, model: Model, theta: Floats) -> Law:
         return Law(_pendulum, (strength, self.shape["hangs_at"]))

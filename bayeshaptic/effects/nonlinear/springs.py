@@ -13,6 +13,7 @@ from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, MOTOR, Law,
 from bayeshaptic.effects.nonlinear.protocol import Floats, Motion, NonlinearEffect
 from bayeshaptic.effects.nonlinear.shapes import POSITION, STRETCH, Shape, Usual
 from bayeshaptic.effects.registry import register
+from bayeshaptic.effects.typical import device_mass
 from bayeshaptic.models import Model
 
 _THREE = "\N{SUPERSCRIPT THREE}"
@@ -59,12 +60,10 @@ class HardeningSpring(NonlinearEffect):
         )
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
-        values = dict(zip(model.names, theta, strict=True))
         if self.place == CONNECTION:
-            stiffness = values["kc"]
+            stiffness = theta[model.names.index("kc")]
         else:
-            mass = values.get("m", values.get("m1", 0.0) + values.get("m2", 0.0))
-            stiffness = mass * (2 * np.pi * 2.0) ** 2
+            stiffness = device_mass(model, theta) * (2 * np.pi * 2.0) ** 2
         scale = stiffness / np.mean(motion.position**2)
         return scale * np.array([0.001, 0.003, 0.01, 0.03, 0.1])
 
