@@ -139,9 +139,5 @@ def _marks(
 
 
 def _phase_ticks(axes: Axes) -> None:
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-
     axes.set_ylim(-185, 185)
-    axes.yaxis.set_major_locator(FixedLocator([-180, -60, -LINEAR_DEG, 0, LINEAR_DEG, 60, 180]))
-    axes.yaxis.set_minor_locator(NullLocator())
-    axes.yaxis.set_major_formatter(FuncFormatter(style.plain))
+    style.fixed_ticks(axes.yaxis, [-180, -60, -LINEAR_DEG, 0, LINEAR_DEG, 60, 180])

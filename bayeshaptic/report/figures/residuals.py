@@ -77,13 +77,9 @@ def _legend_above(axes: Axes) -> None:
 
 def _symlog(axes: Axes, worst: float) -> None:
     """Linear within four sd, logarithmic beyond, with plain numbers on it."""
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-
     axes.set_yscale("symlog", linthresh=4.0, linscale=1.0)
     tens = [10.0**k for k in range(1, int(np.log10(1.25 * worst)) + 1)]
-    axes.yaxis.set_major_locator(FixedLocator([*(-t for t in reversed(tens)), -2, 0, 2, *tens]))
-    axes.yaxis.set_minor_locator(NullLocator())
-    axes.yaxis.set_major_formatter(FuncFormatter(style.plain))
+    style.fixed_ticks(axes.yaxis, [*(-t for t in reversed(tens)), -2, 0, 2, *tens])
 
 
 def noise_band(axes: Axes, bands: BandResidual) -> None:

@@ -128,6 +128,16 @@ def log_scale(axis: XAxis | YAxis, subs: Sequence[int] = (1,)) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
+def fixed_ticks(axis: XAxis | YAxis, places: Sequence[float]) -> None:
+    """Plain numbers at `places`, and no ticks between them."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
+
+    axis.set_major_locator(FixedLocator(places))
+    axis.set_major_formatter(FuncFormatter(plain))
+    axis.set_minor_locator(NullLocator())
+    axis.set_minor_formatter(NullFormatter())
+
+
 def frequency_axis(axes: Axes, low_hz: float, high_hz: float, label: str = "") -> None:
     """A logarithmic frequency axis with plain numbers (1, 10, 100) on it."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator

@@ -74,16 +74,11 @@ def _changes(one: Sweep, i: int) -> bool:
 
 
 def _log_axis(axes: Axes, values: np.ndarray) -> None:
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
-
     low, high = np.log10(values[0]), np.log10(values[-1])
     nice = [d * 10.0**p for p in range(int(low) - 2, int(high) + 2) for d in (1, 2, 5)]
     axes.set_xscale("log")
     ticks = [tick for tick in nice if values[0] <= tick <= values[-1]]
-    axes.xaxis.set_major_locator(FixedLocator(ticks))
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.xaxis.set_major_formatter(FuncFormatter(style.plain))
+    style.fixed_ticks(axes.xaxis, ticks)
 
 
 def _legend(figure: Figure, kinds: list[str], jumps: bool) -> None:

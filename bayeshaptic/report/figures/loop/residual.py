@@ -70,8 +70,6 @@ def _sorted(fit: Fit) -> tuple[NDArray[Any], NDArray[Any]]:
 
 def _scores(axes: Axes, fit: Fit, look: dict[str, Any]) -> list[Any]:
     """A point a window; those of a large misfit are pressed together."""
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-
     from bayeshaptic.diagnosis.residuals.residual import window_scores
 
     if fit.windows is None:
@@ -82,7 +80,5 @@ def _scores(axes: Axes, fit: Fit, look: dict[str, Any]) -> list[Any]:
     if high > 12:
         axes.set_yscale("symlog", linthresh=4.0, linscale=1.0)
         tens = [t for t in (10.0, 30.0, 100.0, 300.0) if t < 1.1 * high]
-        axes.yaxis.set_major_locator(FixedLocator([-2, 0, 2, *tens]))
-        axes.yaxis.set_minor_locator(NullLocator())
-        axes.yaxis.set_major_formatter(FuncFormatter(style.plain))
+        style.fixed_ticks(axes.yaxis, [-2, 0, 2, *tens])
     return points
