@@ -42,6 +42,12 @@ def silent(share: float, word: str) -> None:
     """Tell nobody that a `share` of the work is done, and the `word`."""
 
 
+def advance(bar: Any, share: float, word: str) -> None:
+    """Move a bar of tqdm's on to a `share` of the work, and show the `word`."""
+    bar.set_description_str(word, refresh=False)
+    bar.update(max(share - bar.n, 0.0))
+
+
 class Bar:
     """A bar on stderr, which ends with the work."""
 
@@ -54,8 +60,7 @@ class Bar:
             from tqdm.auto import tqdm
 
             self._bar = tqdm(total=1.0, dynamic_ncols=True, bar_format=FORM)
-        self._bar.set_description_str(word, refresh=False)
-        self._bar.update(max(share - self._bar.n, 0.0))
+        advance(self._bar, share, word)
         if share >= 1.0:
             self._bar.close()
             self._bar = None

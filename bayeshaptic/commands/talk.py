@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from bayeshaptic.compiled import when_compiling
 from bayeshaptic.errors import one_line
+from bayeshaptic.progress import FORM, advance
 
 if TYPE_CHECKING:
     from bayeshaptic.report.reported import Reported
@@ -42,9 +43,8 @@ class Talk:
         if not quiet and sys.stderr.isatty():
             from tqdm import tqdm
 
-            form = "{percentage:3.0f} % |{bar}| {elapsed}, {remaining} to go; {desc}"
             self._bar = tqdm(
-                total=1.0, leave=False, dynamic_ncols=True, bar_format=form, smoothing=0
+                total=1.0, leave=False, dynamic_ncols=True, bar_format=FORM, smoothing=0
             )
 
     def __enter__(self) -> Talk:
@@ -61,8 +61,7 @@ class Talk:
     def progress(self, share: float, word: str) -> None:
         """Show that a `share` (0 to 1) of the work is done, and a `word` about what comes now."""
         if self._bar is not None:
-            self._bar.set_description_str(word, refresh=False)
-            self._bar.update(max(share - self._bar.n, 0.0))
+            advance(self._bar, share, word)
 
     def say(self, line: str) -> None:
         """A line of the results."""
