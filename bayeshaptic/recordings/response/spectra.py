@@ -147,6 +147,11 @@ class RandomSpectra:
         lines = np.diff(self.edges) - float(LEAKAGE_TERMS)
         return lines if self.ringing_hz is None else lines - 2.0 * ~np.isnan(self.ringing_hz)
 
+    def span_hz(self, windows: NDArray[Any]) -> tuple[float, float]:
+        """The lowest and the highest line of `windows`, numbers in ascending order."""
+        first, last = self.edges[windows[0]], self.edges[windows[-1] + 1] - 1
+        return float(self.frequency_hz[first]), float(self.frequency_hz[last])
+
     def lowest(self, count: int) -> RandomSpectra:
         """Its lowest windows alone."""
         lines = slice(self.edges[count])

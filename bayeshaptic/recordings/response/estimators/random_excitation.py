@@ -159,8 +159,7 @@ def _through_reference(
             f"{len(spectra.strength)} windows of frequencies, and {FEWEST_STRONG} are needed; "
             "let it step more often or more widely, or be noise, and record longer"
         )
-    first, last = spectra.edges[strong[0]], spectra.edges[strong[-1] + 1] - 1
-    low, high = (float(spectra.frequency_hz[line]) for line in (first, last))
+    low, high = spectra.span_hz(strong)
     text = (
         f"Band {low:.3g} to {high:.4g} Hz, chosen where the reference moves the force: in "
         f"{len(strong)} of {len(spectra.strength)} windows."
@@ -205,8 +204,7 @@ def _in_given_band(
     asked = f"the band was set to {band_hz[0]:g} to {band_hz[1]:g} Hz"
     if len(driven) == 0:
         raise InputError(f"{recording.name}: {asked}, where the force has no power")
-    first, last = spectra.edges[driven[0]], spectra.edges[driven[-1] + 1] - 1
-    low, high = (float(spectra.frequency_hz[line]) for line in (first, last))
+    low, high = spectra.span_hz(driven)
     text = f"The force has no power outside {low:.3g} to {high:.4g} Hz ({asked})."
     return lines.cut((low, high), minimum), Notice("warning", "band", text)
 
