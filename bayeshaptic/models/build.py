@@ -8,7 +8,7 @@ from dataclasses import replace
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.devices import Device
 from bayeshaptic.errors import InputError
-from bayeshaptic.models.model import Model
+from bayeshaptic.models.model import Model, before_delay
 from bayeshaptic.models.parameter import Parameter
 from bayeshaptic.models.prior import HalfNormal, LogNormal, Normal, Prior
 from bayeshaptic.models.prior_of_zero import NearZero
@@ -204,10 +204,8 @@ def with_force_sensor(model: Model) -> Model:
         model = model.with_known({"delay_s": 0.0})
     belief = HalfNormal(FORCE_LAG_S)
     lag = Parameter("force_lag_s", *QUANTITIES["force_lag_s"], prior=belief)
-    own = tuple(p for p in model.parameters if p.name != "delay_s")
-    delay = tuple(p for p in model.parameters if p.name == "delay_s")
     reference = model.reference and {**model.reference, "force_lag_s": 0.1 * FORCE_LAG_S}
-    return replace(model, parameters=(*own, lag, *delay), reference=reference)
+    return replace(model, parameters=before_delay(model.parameters, (lag,)), reference=reference)
 
 
 def _build(

@@ -271,9 +271,7 @@ class Model(Shown):
     @at_the_door
     def with_effect(self, effect: Extension) -> Model:
         """With one more linear effect, whose parameters come before the delay's."""
-        own = tuple(p for p in self.parameters if p.name != "delay_s")
-        delay = tuple(p for p in self.parameters if p.name == "delay_s")
-        parameters = own + tuple(effect.parameters) + delay
+        parameters = before_delay(self.parameters, effect.parameters)
         return replace(self, parameters=parameters, effects=(*self.effects, effect))
 
     def without_effect(self, effect: Extension) -> Model:
@@ -297,3 +295,8 @@ class Model(Shown):
             f"force in {pretty_unit(self.force_unit)}, position in {self.position_unit}; "
             f"period {period}, delay {known}",
         )
+
+
+def before_delay(known: Iterable[Parameter], added: Iterable[Parameter]) -> tuple[Parameter, ...]:
+    """Parameters with more of them, which come before the delay: it stays the last."""
+    return tuple(sorted((*known, *added), key=lambda parameter: parameter.name == "delay_s"))
