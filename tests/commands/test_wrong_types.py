@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import bayeshaptic as bh
+from bayeshaptic.stability.cases import DeviceLimit
 
 CLASSES = {name: getattr(bh, name) for name in dir(bh) if inspect.isclass(getattr(bh, name))}
 # Arguments for which anything may be given, or which the function itself looks at.
@@ -82,6 +83,7 @@ def test_an_argument_of_a_wrong_type(
 FREE_MODEL = bh.free(device="lhifam")
 REGION = bh.kb_region(FREE_MODEL)
 LIMIT = bh.CriticalStiffness(np.ones(32), np.ones(32), "N/m", (), np.zeros(32, int))
+OF_ALL = DeviceLimit(np.ones(32), np.zeros(32, int), (), "N/m")
 
 
 @pytest.mark.parametrize(
@@ -99,6 +101,8 @@ LIMIT = bh.CriticalStiffness(np.ones(32), np.ones(32), "N/m", (), np.zeros(32, i
         (lambda: LIMIT.safe(2), "risk is 2; give a number between 0 and 1"),
         (lambda: LIMIT.safe("1 %"), "risk is '1 %'"),
         (lambda: LIMIT.quantile([0.1, 1.1]), "p is"),
+        (lambda: OF_ALL.quantile(1.1), "p is 1.1; give a number between 0 and 1"),
+        (lambda: OF_ALL.probability_unstable("x"), "stiffness is 'x'; give numbers"),
         (lambda: LIMIT.tip(0), "lever_m is 0; give a number above 0"),
         (lambda: LIMIT.probability_unstable("x"), "stiffness is 'x'; give numbers"),
         (lambda: bh.Options(seed=-1), "seed is -1; give a number of at least 0"),
