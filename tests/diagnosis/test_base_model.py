@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -42,6 +43,54 @@ def traced(name: str, verdict: str, chi_square: float, *sizes: int, family: str 
     return SimpleNamespace(verdict=verdict, state=state)
 
 
+class FakeLoop:
+    """One that takes as many rounds as it accepts effects, and one at least."""
+
+    def __init__(
+        self,
+        loops: dict[str, Any],
+        glances: dict[str, bool] | None,
+        seen: list[str],
+        etfe: Any,
+        fitted: Any,
+        budget_s: float,
+        *_: Any,
+        **__: Any,
+    ) -> None:
+        self.end, self.rounds = loops[fitted.model.name], 0
+        self.meter = Meter(budget_s)
+        self.fitted, self.name = fitted, fitted.model.name
+        self.glances, self.seen = glances, seen
+
+    @property
+    def traced(self) -> Any:
+        verdict = self.end.verdict if self.done else UNEXPLAINED
+        return SimpleNamespace(verdict=verdict, state=self.end.state)
+
+    @property
+    def done(self) -> bool:
+        return self.rounds >= max(len(self.end.state.accepted), 1)
+
+    @property
+    def misfits(self) -> bool:
+        return not self.done or self.end.verdict == UNEXPLAINED
+
+    @property
+    def state(self) -> Any:
+        effects = self.end.state.accepted[: self.rounds]
+        size = self.fitted.model.size + sum(effect.size for effect in effects)
+        own = SimpleNamespace(model=SimpleNamespace(size=size))
+        return SimpleNamespace(fit=own, accepted=effects)
+
+    def glance(self) -> bool | None:
+        return (self.glances or {}).get(self.name)
+
+    def go_on(self, patient: bool = True) -> None:
+        at_length = patient or self.glances is None
+        self.seen.append(self.name if at_length else f"{self.name}, at first sight")
+        self.rounds += 1
+
+
 def chosen_of(
     monkeypatch: pytest.MonkeyPatch,
     chosen: str,
@@ -69,49 +118,13 @@ def rounds_of(
     `glances` say of base models whether an effect explains everything at first sight; rounds
     without patience are then told apart.
     """
-    seen = []
+    seen: list[str] = []
 
     def deviance(of: Any, noise: float) -> tuple[float, float]:
         far = from_a_hand * of.model.held
         return 2 * np.sum(of.residual**2) / noise + far, far
 
-    class Loop:
-        """One that takes as many rounds as it accepts effects, and one at least."""
-
-        def __init__(self, etfe: Any, fitted: Any, budget_s: float, *_: Any, **__: Any) -> None:
-            self.end, self.rounds = loops[fitted.model.name], 0
-            self.meter = Meter(budget_s)
-            self.fitted, self.name = fitted, fitted.model.name
-
-        @property
-        def traced(self) -> Any:
-            verdict = self.end.verdict if self.done else UNEXPLAINED
-            return SimpleNamespace(verdict=verdict, state=self.end.state)
-
-        @property
-        def done(self) -> bool:
-            return self.rounds >= max(len(self.end.state.accepted), 1)
-
-        @property
-        def misfits(self) -> bool:
-            return not self.done or self.end.verdict == UNEXPLAINED
-
-        @property
-        def state(self) -> Any:
-            effects = self.end.state.accepted[: self.rounds]
-            size = self.fitted.model.size + sum(effect.size for effect in effects)
-            own = SimpleNamespace(model=SimpleNamespace(size=size))
-            return SimpleNamespace(fit=own, accepted=effects)
-
-        def glance(self) -> bool | None:
-            return (glances or {}).get(self.name)
-
-        def go_on(self, patient: bool = True) -> None:
-            at_length = patient or glances is None
-            seen.append(self.name if at_length else f"{self.name}, at first sight")
-            self.rounds += 1
-
-    monkeypatch.setattr(loops_in_turn, "Loop", Loop)
+    monkeypatch.setattr(loops_in_turn, "Loop", partial(FakeLoop, loops, glances, seen))
     monkeypatch.setattr(criterion, "deviance", deviance)
     monkeypatch.setattr(best_base, "replace", lambda old, **new: _changed(old, new))
     fits = {name: fit(name, value) for name, value in misfits.items()}

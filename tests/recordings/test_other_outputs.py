@@ -161,9 +161,7 @@ def test_a_velocity_beside_a_command(device, tmp_path):
     for row, push in enumerate(force):
         states[row] = state
         state = step[:4, :4] @ state + step[:4, 4] * push
-    path = tmp_path / "tacho.npz"
-    np.savez(path, t=np.arange(9000) * PERIOD_S, u=force, v=states[:, 2])
-    recording = bh.read_recording(path, columns="time=t,force=u[N],velocity=v[m/s]")
+    recording = tacho(tmp_path / "tacho.npz", force, states[:, 2])
     lines = np.exp(-2j * np.pi * np.outer(RATES_HZ, np.arange(3000) * PERIOD_S))
     position = recording.position
     position = position - (position[8000] - position[7000]) / 1000 * np.arange(9000)  # of its mean
@@ -184,9 +182,7 @@ def test_a_velocity_beside_a_command_is_no_feedback(tmp_path):
     force = rng.standard_normal(6000)
     speed = lfilter([0.0, 1e-3 / 0.5], [1.0, -np.exp(-3e-3)], force)
     speed += 1e-4 * np.std(speed) * rng.standard_normal(6000)
-    path = tmp_path / "tacho.npz"
-    np.savez(path, t=np.arange(6000) * PERIOD_S, u=force, v=speed)
-    recording = bh.read_recording(path, columns="time=t,force=u[N],velocity=v[m/s]")
+    recording = tacho(tmp_path / "tacho.npz", force, speed)
     assert causality(replace(recording, sensed=None)).has_feedback
     judged = causality(recording)
     assert not judged.has_feedback and not judged.doubtful
@@ -255,8 +251,7 @@ def test_differences_of_an_encoder_are_told_from_a_tachometer(output, tmp_path):
     hand = lfilter(*butter(4, 2 * 5 * PERIOD_S), 0.1 * rng.standard_normal(8000))
     seen["filtered, held"] = lfilter([0.45], [1.0, -0.55], seen["differences"] + hand)
     path = tmp_path / "speed.npz"
-    np.savez(path, t=np.arange(8000) * PERIOD_S, u=force, v=seen[output])
-    recording = bh.read_recording(path, columns="time=t,force=u[N],velocity=v[m/s]")
+    recording = tacho(path, force, seen[output])
     if output.startswith("filtered"):
         with pytest.raises(InputError, match="they were filtered"):
             with_differences(recording)
@@ -267,20 +262,30 @@ def test_differences_of_an_encoder_are_told_from_a_tachometer(output, tmp_path):
         assert np.allclose(told.position, count * np.round(position / count))
 
 
+def gains_of_one_mass(mass, damping, delay_s):
+    """The velocity's filter from a held command, [0, 1 - late, late - keep] / b over 1 - keep/z."""
+    keep = np.exp(-damping / mass * PERIOD_S)
+    late = np.exp(-damping / mass * (PERIOD_S - delay_s))
+    return np.array([0.0, 1 - late, late - keep]) / damping, keep
+
+
+def tacho(path, force, speed):
+    """The recording of a file with a command and a velocity."""
+    np.savez(path, t=np.arange(len(force)) * PERIOD_S, u=force, v=speed)
+    return bh.read_recording(path, columns="time=t,force=u[N],velocity=v[m/s]")
+
+
 def tacho_of_one_mass(path, noise, pushed=0.0):
     """A rigid device under noise; beside the command something pushes it at low frequencies."""
     mass, damping, delay_s = 0.3, 2.0, 3e-4
     rng = np.random.default_rng(7)
     force = rng.standard_normal(12000)
-    keep = np.exp(-damping / mass * PERIOD_S)
-    late = np.exp(-damping / mass * (PERIOD_S - delay_s))
-    gains = np.array([0.0, 1 - late, late - keep]) / damping
+    gains, keep = gains_of_one_mass(mass, damping, delay_s)
     besides = lfilter(*butter(2, 2 * 20 * PERIOD_S), pushed * rng.standard_normal(12000))
     speed = lfilter(gains, [1.0, -keep], force)
     speed += lfilter([0.0, (1 - keep) / damping], [1.0, -keep], besides)
     speed += noise * np.std(speed) * rng.standard_normal(12000)
-    np.savez(path, t=np.arange(12000) * PERIOD_S, u=force, v=speed)
-    recording = bh.read_recording(path, columns="time=t,force=u[N],velocity=v[m/s]")
+    recording = tacho(path, force, speed)
     return recording, np.array([mass, damping]), delay_s
 
 
@@ -308,9 +313,7 @@ def test_no_rows_are_missing_where_friction_turns_a_velocity(tmp_path):
             most = friction / mass * PERIOD_S / steps
             speed = free - min(max(free, -most), most)
     noise = 7e-4 * np.std(speeds) * rng.standard_normal(8000)
-    path = tmp_path / "tacho.npz"
-    np.savez(path, t=np.arange(8000) * PERIOD_S, u=force, v=speeds + noise)
-    recording = bh.read_recording(path, columns="time=t,force=u[N],velocity=v[m/s]")
+    recording = tacho(tmp_path / "tacho.npz", force, speeds + noise)
     begun = begin(recording, "rigid", Options(delay_s=late / steps * PERIOD_S))
     tests = {test.name: test for test in measurement_tests(begun.fit, begun.etfe)}
     assert not tests["dropped_samples"].flagged
@@ -321,14 +324,10 @@ def test_the_limit_from_a_tachometer_beside_a_command(tmp_path):
     mass, damping, delay_s = 0.4, 2.0, 4e-4
     rng = np.random.default_rng(6)
     force = rng.standard_normal(12000)
-    keep = np.exp(-damping / mass * PERIOD_S)
-    late = np.exp(-damping / mass * (PERIOD_S - delay_s))
-    gains = np.array([0.0, 1 - late, late - keep]) / damping
+    gains, keep = gains_of_one_mass(mass, damping, delay_s)
     speed = lfilter(gains, [1.0, -keep], force)
     speed += 1e-3 * np.std(speed) * rng.standard_normal(12000)
-    path = tmp_path / "tacho.npz"
-    np.savez(path, t=np.arange(12000) * PERIOD_S, u=force, v=speed)
-    recording = bh.read_recording(path, columns="time=t,force=u[N],velocity=v[m/s]")
+    recording = tacho(tmp_path / "tacho.npz", force, speed)
     model = bh.rigid(delay_s=delay_s, period_s=PERIOD_S)
     true = bh.critical_stiffness(model, np.array([mass, damping])).value
     closed = bh.close_loop(recording, "rigid", delay_s=delay_s, held=False, hidden=False)
