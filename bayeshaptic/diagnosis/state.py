@@ -201,14 +201,14 @@ def cost(fit: Fit) -> float:
 
 
 def share(windows: Windows, parts: tuple[int, ...]) -> NDArray[np.bool_]:
-    """A mask of the windows in the given parts of every four; all by the direct method."""
+    """Which windows, (W,), are in the given parts of every four; all by the direct method."""
     if windows.noise is not None:
         return np.ones(len(windows.scatter), bool)
     return np.isin(np.arange(len(windows.scatter)) % 4, parts)
 
 
 def fit_part(model: Model, windows: Windows, theta: Floats) -> Floats:
-    """The vector that fits the windows to fit best, near a given one."""
+    """The vector, shape (P,), that fits the windows to fit best, near `theta`."""
     return polish(model, windows.part(share(windows, FIT)), theta)
 
 

@@ -45,7 +45,7 @@ class Unseen:
 
 
 def alone(strength: Floats, shapes: Floats) -> Floats:
-    """Of an effect whose one parameter is its strength."""
+    """Parameters, (N, 1), of an effect whose one parameter is its strength, (N,)."""
     return strength[:, None]
 
 

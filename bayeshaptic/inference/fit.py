@@ -226,7 +226,7 @@ def ends_at_bounds(phi: Floats, low: Floats, high: Floats) -> NDArray[np.bool_]:
 
 
 def search_box(model: Model) -> tuple[Coordinates, Floats, Floats]:
-    """The coordinates of a fit, and its bounds in them."""
+    """The coordinates of a fit, and its lower and upper bounds in them, shape (P,) each."""
     here = coordinates(model)
     low, high = (here.coordinate(bound) for bound in reach(model, REACH_SDS))
     return here, low, high
@@ -252,7 +252,7 @@ def real_parts(normalised: Complexes) -> Floats:
 
 
 def summarise(model: Model, windows: Windows, theta: Floats, agreeing: int = 0) -> Fit:
-    """The fit at `theta`, with its covariance and outcomes."""
+    """The fit at `theta`, shape (P,), with its covariance and outcomes."""
     here, low, high = search_box(model)
     likelihood = Likelihood(model, windows)
     phi = here.coordinate(theta[None])

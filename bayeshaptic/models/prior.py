@@ -45,7 +45,7 @@ class Prior(Protocol):
 
 
 def draw(prior: Prior, rng: np.random.Generator, size: int) -> Floats:
-    """`size` independent draws from `prior`, by inversion."""
+    """Independent draws from `prior`, shape (size,), by inversion."""
     return prior.quantile(rng.uniform(size=size))
 
 

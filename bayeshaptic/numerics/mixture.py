@@ -82,13 +82,13 @@ class StudentMixture:
 
 
 def student(mean: Floats, covariance: Floats, freedom: float = 8.0) -> StudentMixture:
-    """One Student t distribution with the given mean and scale matrix."""
+    """One Student t distribution with the given mean, (D,), and scale matrix, (D, D)."""
     root = root_of(covariance)
     return StudentMixture(np.ones(1), mean[None], root[None], np.array([freedom]))
 
 
 def root_of(covariance: Floats) -> Floats:
-    """Cholesky factor; directions that the points do not span get a little width of their own."""
+    """Cholesky factor, (D, D); directions that the points do not span get a little width."""
     covariance = 0.5 * (covariance + covariance.T)
     no_width = 1e-24  # variance, of coordinates of order one, that rounding errors have
     scale = np.sqrt(np.maximum(np.diag(covariance), no_width))

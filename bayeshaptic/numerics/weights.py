@@ -17,12 +17,12 @@ def normalised(log_weights: Floats) -> Floats:
 
 
 def effective(weights: Floats) -> float:
-    """Kish's effective number of weighted points."""
+    """Kish's effective number of points of weights (N,)."""
     return float(weights.sum() ** 2 / max(np.sum(weights**2), 1e-300))
 
 
 def tempered(log_weights: Floats, least: float) -> Floats:
-    """Weights, flattened until at least `least` points count: what fits five points means nothing.
+    """Weights (N,), flattened until `least` points count: what fits five points means nothing.
 
     In logarithms, because one point may outweigh the others by more than a number can hold.
     """
@@ -47,7 +47,7 @@ def truncated(log_weights: Floats) -> Floats:
 
 
 def systematic(weight: Floats, count: int, rng: np.random.Generator) -> Ints:
-    """`count` indices, each as often as its weight says, in ascending order."""
+    """Indices, shape (count,), each as often as its weight says, in ascending order."""
     edges = np.cumsum(weight / weight.sum())
     edges[-1] = 1.0
     return np.searchsorted(edges, (np.arange(count) + rng.uniform()) / count)

@@ -212,7 +212,7 @@ def motions(fit: Fit, recording: Recording) -> dict[str, Floats]:
 
 
 def response_to(fit: Fit, over: str, s: Complexes) -> Complexes:
-    """Position that is read over a force that is a function of `over`, at points s.
+    """Position that is read over a force that is a function of `over`, at points s of shape (L,).
 
     What filters the position filters what forces do, and an actuator's lag does not.
     """
@@ -226,7 +226,7 @@ def response_to(fit: Fit, over: str, s: Complexes) -> Complexes:
 
 
 def driven_velocity(fit: Fit, recording: Recording) -> Floats:
-    """Velocity of the motor without encoder noise.
+    """Velocity of the motor without encoder noise, shape (N,).
 
     What the command does comes from the model; what a hand does besides is taken from the
     measured position below 20 Hz, where the encoder sees it well, and of a free device how it began
@@ -242,13 +242,13 @@ def driven_velocity(fit: Fit, recording: Recording) -> Floats:
 
 
 def load_response(fit: Fit, s: Complexes) -> Complexes:
-    """Position that is read over a force at the load, at points s."""
+    """Position that is read over a force at the load, at points s of shape (L,)."""
     system = fit.model.system(fit.theta)
     return _ratio(*system.mechanism.transfer_to(1), s) * share(system.sensing, s)
 
 
 def pair_response(fit: Fit, s: Complexes) -> Complexes:
-    """Position that is read over a pair of forces in the connection, +1 on m1 and -1 on m2."""
+    """The same over a pair of forces in the connection, +1 on m1 and -1 on m2."""
     system = fit.model.system(fit.theta)
     mechanism = system.mechanism
     own = _ratio(mechanism.mutual(mechanism.drive, (0, 1)), mechanism.transfer()[1], s)

@@ -52,7 +52,7 @@ def coasting_motions(system: LinearSystem, samples: int, period_s: float) -> Flo
 
 
 def parts(columns: Floats, motion: Floats) -> Floats:
-    """How much of each column a motion has, by least squares."""
+    """How much of each column (N, C) a motion (N,) has, by least squares; shape (C,)."""
     size = np.linalg.norm(columns, axis=0)
     alike = columns.T @ columns / np.outer(size, size)
     return np.asarray(lstsq(alike, columns.T @ motion / size, rcond=_ALIKE)[0] / size)

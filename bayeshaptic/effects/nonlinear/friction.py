@@ -26,7 +26,10 @@ FAINT_TO_STRONG = np.array([0.003, 0.01, 0.03, 0.1, 0.3])  # over the force scal
 
 
 def force_scale(model: Model, theta: Floats, motion: Motion) -> float:
-    """The force that viscous damping of the motion would take: what friction hides as."""
+    """The force that viscous damping of the motion would take: what friction hides as.
+
+    `theta` are the values of the linear parameters, shape (P,).
+    """
     corner_hz = 3.0  # b / (2 pi m) of a usual device
     return float(device_mass(model, theta) * motion.velocity.std() * 2 * np.pi * corner_hz)
 

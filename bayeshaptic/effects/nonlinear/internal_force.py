@@ -154,7 +154,7 @@ def numbers_of(laws: Sequence[Law]) -> tuple[Floats, tuple[int, ...]]:
 def steps(
     mechanism: Mechanism, forces: Sequence[Internal], step_s: float
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Exact steps, as `step_through` takes them: matrix, rows, drive, gains, reading."""
+    """Exact steps: matrix, rows, drive, gains, reading, in the shapes that `step_through` takes."""
     a = mechanism.state_matrix()[0]
     reading = np.concatenate([mechanism.drive_vector(), np.zeros(len(a) // 2)])
     corrected = np.zeros_like(reading)

@@ -204,7 +204,7 @@ def start_of(here: Coordinates, fit: Fit) -> Floats:
 
 
 def inside(here: Coordinates, fit: Fit, begin: float = 0.0) -> Floats:
-    """The fit inside the support, the small parameters at a quantile of their priors at least."""
+    """The fit in coordinates, (P,), inside the support, small parameters at a quantile or above."""
     phi = here.coordinate(fit.theta)
     inner = fit.theta.copy()
     for index in (*here.near_zero, *(() if here.beside is None else (here.beside,))):

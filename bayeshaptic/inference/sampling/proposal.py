@@ -143,8 +143,8 @@ def acceptance(
 ) -> float:
     """How often proposals are accepted, by walkers at `found` and between draws of the proposal.
 
-    The walkers, whose log densities are `values`, tell where the proposal misses the density; its
-    own draws, weighted, whether the walkers have spread over humps as the density does.
+    The walkers (W, P), whose log densities are `values` (W,), tell where the proposal misses the
+    density; its own draws, weighted, whether walkers have spread over humps as the density does.
     """
     tried = 1000
     here = rng.choice(len(found), tried)

@@ -150,5 +150,5 @@ def remainder_of(
 
 
 def real_pairs(values: Complexes) -> Floats:
-    """Real and imaginary parts along a further axis."""
+    """Real and imaginary parts along a further axis, shape (..., 2)."""
     return values.view(float).reshape(*values.shape, 2)

@@ -41,7 +41,7 @@ class Stretch:
 
 
 def switches_of(force: Floats) -> Ints:
-    """The first sample after each switch of a force between two levels."""
+    """The first sample after each switch of a force (N,) between two levels, shape (S,)."""
     return np.flatnonzero(np.diff(_pushes_up(force))) + 1
 
 

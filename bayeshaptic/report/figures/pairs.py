@@ -30,7 +30,7 @@ def correlation(draws: NDArray[Any]) -> NDArray[Any]:
 
 
 def strongest(matrix: NDArray[Any], count: int = SHOWN) -> list[int]:
-    """Indices of the `count` parameters in the strongest pairs, in the order of the model."""
+    """Indices of the `count` parameters in the strongest of correlations (P, P), in order."""
     size = np.abs(np.triu(matrix, 1))
     chosen: list[int] = []
     for flat in np.argsort(-size, axis=None):

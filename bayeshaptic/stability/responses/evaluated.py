@@ -91,7 +91,7 @@ class EvaluatedResponse:
 
 
 def ends(response: Response, exact: bool) -> tuple[Floats, Floats]:
-    """What `Response.at_ends` gives, by looking very close to the ends."""
+    """What `Response.at_ends` gives, (B,) each, by looking very close to the ends."""
     every = np.arange(len(response.delay))
     angles = np.broadcast_to([LOWEST, np.pi], (len(every), 2))
     static, nyquist = response.at(every, angles).T
@@ -101,7 +101,7 @@ def ends(response: Response, exact: bool) -> tuple[Floats, Floats]:
 
 
 def held_at_rest(response: Response) -> NDArray[np.bool_]:
-    """Whether static stiffness is positive, or an integrator's phase above -180 degrees.
+    """Whether static stiffness is positive, or an integrator's phase above -180 degrees, (B,).
 
     It is what a mechanism that is stable by itself can still do wrong for K -> 0+: a double
     integrator with a delay, or a negative static stiffness.

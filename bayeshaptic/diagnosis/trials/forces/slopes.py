@@ -78,7 +78,7 @@ def slopes_of_all(
 
 
 def nudges_of(tryout: Tryout) -> Floats:
-    """How far each linear parameter goes for the slopes of the motion: some standard deviations.
+    """How far each linear parameter goes for the slopes of the motion, shape (P,): some sds.
 
     Less would see how a sticking mass jumps, not where it goes; more would leave a resonance.
     """

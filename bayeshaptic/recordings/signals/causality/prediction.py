@@ -277,7 +277,7 @@ def _correlation(one: Floats, other: Floats) -> Share:
 
 
 def within_the_usual(signal: Floats) -> Floats:
-    """A signal with zeros where it lies beyond its usual size."""
+    """A signal, shape (N,), with zeros where it lies beyond its usual size."""
     size = np.abs(signal)
     return np.where(size <= _CUT * np.quantile(size, _USUAL), signal, 0.0)
 
