@@ -113,9 +113,9 @@ def frf_from_arrays(
     frequency = columns["frequency"]
     _check_frequencies(path, frequency, period_s)
     factor = 1.0
-    derivatives = STRUCTURAL.get(of, 0)
     written = mapping[of].unit if of in mapping else None
     if written is not None:
+        derivatives = STRUCTURAL.get(of, 0)
         position_unit, force_unit, factor = _units_of_gain(path, written, derivatives)
     units = choose_units(force_unit, position_unit, kind, str(path))
     notices: tuple[Notice, ...] = ()
@@ -123,16 +123,12 @@ def frf_from_arrays(
         text = f"No units were given: the gain is taken to be in {units[1]}/{units[0]}."
         notices = (Notice("note", "units", text, ("force", "position")),)
     notices += left_out
-    phase = np.exp(1j * np.radians(columns["phase_deg"]))
-    value: Complexes = np.asarray(10 ** (columns[of] / 20) * phase)
-    variance, averages = _variance(path, columns, value)
-    variance = variance + np.abs(value) ** 2 * relative_variance(columns[of], columns["phase_deg"])
-    own = None
     if of in STRUCTURAL:
-        value, own = as_held(value, variance, frequency, period_s, derivatives)
-        variance = with_images_allowed_for(value, own, frequency, period_s)
-        own, notices = own * factor**2, (*notices, told(of))
-    spectra = TableSpectra(frequency, value * factor, variance * factor**2, averages, own)
+        notices += (told(of),)
+    found = _spectra(path, columns, of, period_s)
+    own = None if found.own_variance is None else found.own_variance * factor**2
+    value, variance = found.value * factor, found.variance * factor**2
+    spectra = TableSpectra(frequency, value, variance, found.averages, own)
     return Etfe(
         frequency_hz=frequency,
         value=spectra.value,
@@ -145,6 +141,22 @@ def frf_from_arrays(
         spectra=spectra,
         notices=notices,
     )
+
+
+def _spectra(
+    path: Path, columns: Mapping[str, NDArray[np.float64]], of: str, period_s: float
+) -> TableSpectra:
+    """The response of a table in its own units, sampled and held as in a loop of this period."""
+    frequency = columns["frequency"]
+    phase = np.exp(1j * np.radians(columns["phase_deg"]))
+    value: Complexes = np.asarray(10 ** (columns[of] / 20) * phase)
+    variance, averages = _variance(path, columns, value)
+    variance = variance + np.abs(value) ** 2 * relative_variance(columns[of], columns["phase_deg"])
+    if of not in STRUCTURAL:
+        return TableSpectra(frequency, value, variance, averages)
+    value, own = as_held(value, variance, frequency, period_s, STRUCTURAL[of])
+    variance = with_images_allowed_for(value, own, frequency, period_s)
+    return TableSpectra(frequency, value, variance, averages, own)
 
 
 def _columns(
