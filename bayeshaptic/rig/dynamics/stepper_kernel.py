@@ -46,10 +46,7 @@ def run(tables, forces, memory, acting, hand, states):  # type: ignore[no-untype
                         if dry[j] and done:
                             done = _rub(tables, part, level, j, n, z, mode, end, modes)
                     if done:
-                        for j in range(len(dry)):
-                            if dry[j] and modes[j]:
-                                v = _at(end, places, j, 2)
-                                end[n + 3 + j] = -modes[j] * _sliding(v, constants, j)
+                        _slide(places, dry, constants, n, end, modes)
                         if smooth:
                             _settle(places, dry, constants, forces, n, z, end)
                         z[:] = end
@@ -133,6 +130,15 @@ def _rub(tables, part, level, j, n, z, mode, end, modes):  # type: ignore[no-unt
         if way == 0:
             end[place[j, 0]] = z[place[j, 0]]
     return True
+
+
+@kernel(inline=True, exact=True)
+def _slide(places, dry, constants, n, end, modes):  # type: ignore[no-untyped-def]
+    """Friction where it slides at the end of the step."""
+    for j in range(len(dry)):
+        if dry[j] and modes[j]:
+            v = _at(end, places, j, 2)
+            end[n + 3 + j] = -modes[j] * _sliding(v, constants, j)
 
 
 @kernel(inline=True, exact=True)
