@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.signal import butter, chirp, filtfilt, lfilter, sosfilt
-from tiny_bench import CASES, CRITICAL, PERIOD, SCALE, band_noise, record
+from tiny_bench import CASES, CRITICAL, PERIOD, SCALE, band_noise, record, relay
 
 from bayeshaptic.errors import InputError
 from bayeshaptic.recordings.checks.check import check_recording
@@ -252,10 +252,7 @@ def test_a_relay_is_feedback_and_a_binary_sequence_is_not() -> None:
     force, position = record(case, bits, rng)
     assert not judge(force[0], position[0]).relay
 
-    def control(k: int, position: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-        return np.where(position[:, k] < 0, 3.0, -3.0)
-
-    force, position = record(case, bits, rng, control=control)
+    force, position = record(case, bits, rng, control=relay)
     found = judge(force[0], position[0])
     assert found.relay
     assert found.has_feedback
@@ -265,14 +262,14 @@ def about(bench: Bench, reach: float, hysteresis: float, seconds: float = 8.0) -
     """A relay about one set point and, half-way, about that on the other side."""
     half, force = round(seconds / bench.period_s) // 2, 3 * bench.force_rms
 
-    def relay(k: int, position: float) -> float:
+    def controller(k: int, position: float) -> float:
         nonlocal force
         off = position - (reach if k < half else -reach)
         if abs(off) > hysteresis:
             force = -np.sign(off) * abs(force)
         return float(force)
 
-    return recording_from_arrays(**run_loop(bench, relay, seconds, seed=5).signals)
+    return recording_from_arrays(**run_loop(bench, controller, seconds, seed=5).signals)
 
 
 @pytest.mark.parametrize("hysteresis", [0.0, 0.01])

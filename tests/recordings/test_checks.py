@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.signal import lfilter
-from tiny_bench import PERIOD, SCALE, band_noise, record
+from tiny_bench import PERIOD, SCALE, band_noise, record, relay
 
 import bayeshaptic as bh
 from bayeshaptic.devices import Device, load_device
@@ -250,9 +250,6 @@ def test_feedback_is_warned_of() -> None:
 
     def wall(k: int, position: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         return wanted - 3000 * position[:, k]
-
-    def relay(k: int, position: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-        return np.where(position[:, k] < 0, 3.0, -3.0)
 
     force, position = record("lhifam grasped", noise, rng, control=wall)
     (notice,) = check_recording(Recording(force[0], position[0], PERIOD))
