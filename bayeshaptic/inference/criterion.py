@@ -9,9 +9,8 @@ from bayeshaptic.models.hand import from_a_hand
 from bayeshaptic.numerics.gauss_newton import minimise
 from bayeshaptic.types import Floats
 
-# Differences of BIC, or of twice the log likelihood: evidence "not worth more than a bare
-# mention", and "very strong" evidence
-# (R. E. Kass and A. E. Raftery, JASA 90, 1995).
+# Differences of BIC, or of twice the log likelihood: evidence "not worth more than a bare mention",
+# and "very strong" evidence (R. E. Kass and A. E. Raftery, JASA 90, 1995).
 BARE_MENTION, VERY_STRONG = 2.0, 10.0
 
 

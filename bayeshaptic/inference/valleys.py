@@ -33,8 +33,8 @@ CREEPS = 1e-4
 # Relative steps of cost within a valley: from 0.01 to 0.04 there are as many of them in each of 12
 # simulated recordings, most often two or more beside the deepest.
 ONE_VALLEY = 0.02
-# Half chi-square over the best, of starting points that lead to fits as good: they are not at the
-# end of their valleys yet.
+# Starting points lead to fits as good as the best where their half chi-square is at most this far
+# above it: they are not at the end of their valleys yet.
 _ALIKE = 30.0
 OTHER_VALLEYS = 2  # from which effects are searched for, too: each costs what the fit itself does
 

@@ -25,11 +25,12 @@ from bayeshaptic.types import Floats
 Redraw = Callable[[Floats, np.random.Generator], tuple[Floats, Floats]]
 """From points (B, P) to proposed points, with log density of proposing the way back over there."""
 _MAY_BE_ZERO = (MaybeZero, NearZero)  # priors
-# Standard deviations from zero, from which a parameter is sampled as it is: one that may be zero,
-# and one whose size no prior knows, of whose posterior 2 % lie next to zero then.
+# A parameter that is this many standard deviations from zero is sampled as it is: one that may be
+# zero, and one whose size no prior knows, of whose posterior 2 % lie next to zero then.
 _SEEN, _SEEN_WIDE = 5.0, 3.5
-# Coordinate units, of a ridge that is straight: e^10 in a logarithm.  A guard: the ridges of
-# 12 simulated recordings, held and free, clean and with effects, are all shorter than 1.
+# Longest ridge that counts as straight, in coordinate units: e^10 in a logarithm.  It is a guard:
+# the ridges of 12 simulated recordings, held and free, clean and with effects, are all shorter than
+# 1.
 _LONGEST = 10.0
 
 
