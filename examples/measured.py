@@ -23,9 +23,9 @@ from bayeshaptic.diagnosis.loop import trace
 from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced, balance
 from bayeshaptic.diagnosis.periodic.lines import FLOOR, BalancedState, LineTrials
 from bayeshaptic.diagnosis.periodic.period import Period, one_period, with_floor
-from bayeshaptic.diagnosis.periodic.steady_motion import LOAD
 from bayeshaptic.diagnosis.state import REPORT, share
 from bayeshaptic.diagnosis.traced import Traced
+from bayeshaptic.effects.nonlinear.internal_force import LOAD
 from bayeshaptic.effects.nonlinear.protocol import Motion
 from bayeshaptic.recordings.response.etfe import compress
 from bayeshaptic.recordings.response.spectra import PeriodicSpectra

@@ -20,9 +20,9 @@ from bayeshaptic.diagnosis.periodic.harmonic_balance import balance
 from bayeshaptic.diagnosis.periodic.joint import Basis
 from bayeshaptic.diagnosis.periodic.lines import LineTrials
 from bayeshaptic.diagnosis.periodic.period import one_period, with_floor
-from bayeshaptic.diagnosis.periodic.steady_motion import LOAD, places_of
+from bayeshaptic.diagnosis.periodic.steady_motion import places_of
 from bayeshaptic.diagnosis.state import REPORT, share
-from bayeshaptic.effects.nonlinear.internal_force import CONNECTION
+from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD
 from bayeshaptic.errors import InputError
 from bayeshaptic.inference.time_domain.fit import fit_motion
 from bayeshaptic.recordings import recording_from_arrays

@@ -12,8 +12,9 @@ import bayeshaptic as bh
 from bayeshaptic.diagnosis.periodic.forces import force_candidates
 from bayeshaptic.diagnosis.periodic.harmonic_balance import Balanced, balance
 from bayeshaptic.diagnosis.periodic.period import one_period
-from bayeshaptic.diagnosis.periodic.steady_motion import LOAD, Following
+from bayeshaptic.diagnosis.periodic.steady_motion import Following
 from bayeshaptic.effects.laws import fitted
+from bayeshaptic.effects.nonlinear.internal_force import LOAD
 from bayeshaptic.effects.nonlinear.shapes import Usual
 from bayeshaptic.numerics.extrapolation import Approach
 from bayeshaptic.recordings.response.etfe import compress
