@@ -21,8 +21,13 @@ if TYPE_CHECKING:
     from bayeshaptic.study.analysis import StudyAnalysis
 
 # How a person's bar looks: of the own recording alone, and given all people.
-_ALONE = {"fmt": "s", "color": style.DATA, "markerfacecolor": "white", "markersize": 3.5}
-_ALONE |= {"linewidth": 1.0}
+_ALONE = {
+    "fmt": "s",
+    "color": style.DATA,
+    "markerfacecolor": "white",
+    "markersize": 3.5,
+    "linewidth": 1.0,
+}
 _GIVEN_ALL = {"fmt": "o", "color": style.MODEL, "markersize": 4.0, "linewidth": 1.8}
 _LABEL = 30  # characters of a line in the legend
 _NARROWEST_DB = 0.2  # of the axis: a population that does not differ is not to look as if it did
