@@ -28,8 +28,8 @@ from bayeshaptic.models import Model
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, run_loop
-from bayeshaptic.stability.critical import critical_stiffness
 from bayeshaptic.types import Floats
+from benchmarks.bounds.two_masses import bound_db
 from benchmarks.recordings.controllers import controller_of
 from benchmarks.recordings.door import written_down
 
@@ -78,28 +78,6 @@ def make(seed: int, dithered: bool = False) -> Case:
     return Case(recording, bench, friction / bench.force_rms, what)
 
 
-def bound_db(case: Case, model: Model) -> float:
-    """Least standard deviation of K_CR in dB (Cramer and Rao) where only the encoder disturbs.
-
-    Then the innovations of a free device are white noise of its encoder, whatever the controller.
-    """
-    recording, bench = case.recording, case.bench
-    truth = np.array([bench.values.get(name, bench.delay_s) for name in model.names])
-    power = bench.encoder_resolution**2 / 12 + bench.sensor_noise_rms**2
-    frequency = np.fft.rfftfreq(recording.samples, recording.period_s)[1:-1]
-    force = np.fft.rfft(recording.force)[1:-1] / np.sqrt(recording.samples)
-    size = np.maximum(truth, 1e-6 * np.abs(truth).max())
-    steps = 1e-4 * np.diag(size)
-    both = np.concatenate([truth + steps, truth - steps])
-    count = len(truth)
-    seen = model.response(np.abs(both), frequency) * force
-    slope = (seen[:count] - seen[count:]) / 2e-4
-    information = 2 * (slope.conj() @ slope.T).real / power
-    limits = 20 * np.log10(critical_stiffness(model, np.abs(both)).samples)
-    gradient = (limits[:count] - limits[count:]) / 2e-4
-    return float(np.sqrt(gradient @ np.linalg.pinv(information, rcond=1e-14) @ gradient))
-
-
 def one(seed: int, without: bool = False, dithered: bool = False) -> dict[str, Any]:
     """What became of one recording, without its reference or with it."""
     case = make(seed, dithered)
@@ -129,7 +107,7 @@ def one(seed: int, without: bool = False, dithered: bool = False) -> dict[str, A
     }
     if case.bench.mechanism == "free" and analysis.model.name == "free" and not case.friction:
         sd = float(np.std(20 * np.log10(analysis.limit.samples)))
-        found["over_bound"] = sd / bound_db(case, analysis.model)
+        found["over_bound"] = sd / bound_db(case.recording, case.bench, analysis.model)
     return found
 
 

@@ -18,6 +18,7 @@ from bayeshaptic.diagnosis.hidden.prior import HiddenPrior
 from bayeshaptic.diagnosis.limit_known import SMALL_RISKS, LimitKnown, asked_of_sampler
 from bayeshaptic.diagnosis.options import Options, options_from
 from bayeshaptic.diagnosis.residuals.overdispersion import noise_scale
+from bayeshaptic.diagnosis.state import State
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.around_fit import draws_around
 from bayeshaptic.inference.fit import Fit
@@ -83,6 +84,7 @@ def finish(
     options: Options,
     small_risks: bool = True,
     witness: EtfeCriticalStiffness | None = None,
+    sharper: State | None = None,
 ) -> Analysis:
     """Sample a fit's posterior and find its critical stiffness.
 
@@ -98,6 +100,9 @@ def finish(
         Whether the stiffness at a small risk is to be known, too.
     witness : EtfeCriticalStiffness, optional
         Of this very measurement, where it is known.
+    sharper : State, optional
+        Fit and measurement with all leakage known (`diagnosis/base/free_motion.py`), which are
+        sampled and told in their place.
     """
     clock = Clock(dict(begun.seconds))
     scale = noise_scale(fit)
@@ -107,7 +112,8 @@ def finish(
     watch = LimitKnown(fit.model, SMALL_RISKS if small_risks and not fit.misfits else ())
     with clock.stage("sampling"):
         asked = asked_of_sampler(watch, options.within(0.1, 0.8), most)
-        posterior = sample_around(_with_noise(fit, scale), etfe, asked)
+        sampled, of = (fit, etfe) if sharper is None else (sharper.fit, sharper.etfe)
+        posterior = sample_around(_with_noise(sampled, scale), of, asked)
     with clock.stage("critical stiffness"):
         options.report(0.8, "critical stiffness")
         limit = watch.limit_of(posterior)
@@ -123,11 +129,11 @@ def finish(
         notices = with_units_of(fit, etfe.recording, begun.device, notices)
     return Analysis(
         recording=etfe.recording,
-        etfe=etfe,
+        etfe=of,
         device=begun.device,
         model=posterior.model,  # whose priors know what the fit sees
         choice=begun.choice,
-        fit=fit,
+        fit=sampled,
         posterior=posterior,
         limit=limit,
         etfe_limit=etfe_limit,

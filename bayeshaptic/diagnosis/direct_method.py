@@ -17,6 +17,7 @@ from bayeshaptic.diagnosis.analysis import Analysis
 from bayeshaptic.diagnosis.base.begun import fitted
 from bayeshaptic.diagnosis.base.best_direct import traced_directly
 from bayeshaptic.diagnosis.base.direct import against_direct, opened_directly
+from bayeshaptic.diagnosis.base.free_motion import by_free_motion
 from bayeshaptic.diagnosis.base.opened import Opened
 from bayeshaptic.diagnosis.closed import Closed, limit_alone
 from bayeshaptic.diagnosis.options import Options
@@ -65,11 +66,13 @@ def by_direct_method(found: Opened, model: str | Model, options: Options) -> Clo
     if fit.model.name == "rigid":
         return found
     nothing = EtfeCriticalStiffness(None, None, None, None, fit.model.stiffness_unit, NO_WITNESS)
-    base = finish(begun, begun.etfe, begun.fit, options.within(0.5, 0.7), witness=nothing)
+    sharper, accepted = by_free_motion(traced.state), traced.state.accepted
+    of_base = None if accepted else sharper
+    base = finish(begun, begun.etfe, begun.fit, options.within(0.5, 0.7), True, nothing, of_base)
     analysis = base
-    if traced.state.accepted:
-        etfe, seed = traced.state.etfe, options.seed
-        analysis = finish(begun, etfe, fit, options.within(0.7, 0.95), witness=nothing)
+    if accepted:
+        etfe, seed, last = traced.state.etfe, options.seed, options.within(0.7, 0.95)
+        analysis = finish(begun, etfe, fit, last, witness=nothing, sharper=sharper)
         limit, traced = with_rivals(analysis.limit, traced, seed)
         limit = with_discrepancy(limit, analysis.posterior, begun.fit, traced, seed)
         analysis = replace(
@@ -79,10 +82,11 @@ def by_direct_method(found: Opened, model: str | Model, options: Options) -> Clo
             recording=found.etfe.recording,
             seconds={**analysis.seconds, "closing the loop": tracing_s},
         )
-    return Closed(base, analysis, traced, _error(base, fit), _error(analysis, fit))
+    before, after = _error(base, begun.fit, fit), _error(analysis, fit, fit)
+    return Closed(base, analysis, traced, before, after)
 
 
-def _error(analysis: Analysis, last: Fit) -> dict[str, Any]:
+def _error(analysis: Analysis, fit: Fit, last: Fit) -> dict[str, Any]:
     """The limit, and what a fit leaves over the noise: that is what the last fit leaves."""
-    left = analysis.fit.likelihood.noise_variance / last.likelihood.noise_variance
+    left = fit.likelihood.noise_variance / last.likelihood.noise_variance
     return {**limit_alone(analysis), "weighted_rms": float(np.sqrt(left.mean()))}

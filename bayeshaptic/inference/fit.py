@@ -274,7 +274,7 @@ def summarise(model: Model, windows: Windows, theta: Floats, agreeing: int = 0) 
         chi_square,
         float(likelihood(theta[None])[0]),
         windows,
-        windows.frequency_hz.ravel(),
+        windows.places_hz.ravel(),
         likelihood.normalised(theta[None])[0].ravel(),
         agreeing,
     )

@@ -92,6 +92,13 @@ def least_squares(
     return replace(fit, etfe=etfe)
 
 
+def continued(fit: Fit, etfe: Etfe) -> Fit:
+    """The fit, followed to the optimum of other spectra of the same recording."""
+    theta, windows = _sharpened(fit.model, etfe, fit.theta, _REWEIGHINGS)
+    there = summarise(fit.model, windows, theta, fit.starts)
+    return replace(there, elsewhere=fit.elsewhere, alike=fit.alike, etfe=etfe)
+
+
 def likeliest(fit: Fit, etfe: Etfe, seed: int = 0, most: int = SETS) -> Fit:
     """The fit, or a better one that other sets of starting points lead to, where none misfits.
 

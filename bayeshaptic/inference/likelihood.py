@@ -18,6 +18,7 @@ from bayeshaptic.types import Complexes, Floats
 # What a call costs, and a value of a model with dynamic links, in units of one value of a rational
 # model: 0.4 ms, and 0.15 to 0.3 us, where that takes 12 to 25 ns.
 _CALL, _LINKED = 2e4, 10.0
+_AT_A_TIME = 128  # vectors, of what is done in plain NumPy
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Likelihood:
     def __call__(self, theta: Floats) -> Floats:
         """Log likelihood of parameter vectors of shape (B, P); shape (B,)."""
         form = self._rational_form(theta)
-        if form is None:
+        if form is None or self.windows.common is not None:
             return self.pointwise(theta).sum(axis=1)
         from bayeshaptic.models.response.kernels.likelihood import log_likelihood
 
@@ -67,6 +68,20 @@ class Likelihood:
         return self._deviations(theta, self._precision)
 
     def _deviations(self, theta: Floats, weight: Floats) -> Complexes:
+        if self.windows.common is not None:
+            return self._beside_common(theta, weight)
+        return self._plainly(theta, weight)
+
+    def _beside_common(self, theta: Floats, weight: Floats) -> Complexes:
+        """`_deviations` less what the windows' common columns make of them, some at a time."""
+        out = np.empty((len(theta), *self.windows.target.shape), complex)
+        for start in range(0, len(theta), _AT_A_TIME):
+            some = slice(start, start + _AT_A_TIME)
+            left = self._plainly(theta[some], np.ones_like(weight))
+            out[some] = self.windows.without_common(left) * weight[:, None]
+        return out
+
+    def _plainly(self, theta: Floats, weight: Floats) -> Complexes:
         form = self._rational_form(theta)
         each = 1.0 if form is not None else _LINKED
         spend(_CALL + each * len(theta) * self.windows.frequency_hz.size)
@@ -83,9 +98,8 @@ class Likelihood:
         count, nodes = self.windows.frequency_hz.shape
         frequency_hz = np.ascontiguousarray(self.windows.frequency_hz.ravel())
         out = np.empty((len(theta), *self.windows.target.shape), complex)
-        chunk = 128  # vectors at a time, of what is done in plain NumPy
-        for start in range(0, len(theta), chunk):
-            part = theta[start : start + chunk]
+        for start in range(0, len(theta), _AT_A_TIME):
+            part = theta[start : start + _AT_A_TIME]
             g = self.model.response(part, frequency_hz, measured=True).reshape(
                 len(part), count, nodes
             )
@@ -93,7 +107,7 @@ class Likelihood:
                 fitted = self.windows.design[:, :, 0] * g
             else:  # one small matrix product a window, the batch last
                 fitted = (self.windows.design @ g.transpose(1, 2, 0)).transpose(2, 0, 1)
-            out[start : start + chunk] = self.windows.target - fitted
+            out[start : start + _AT_A_TIME] = self.windows.target - fitted
         return out
 
     def _rational_form(self, theta: Floats) -> RationalArrays | None:

@@ -108,9 +108,9 @@ def _closer(fit: Fit, etfe: Etfe, acted: Floats | float) -> tuple[Fit, Etfe]:
         motion = fitted_motion(fit, recording, acted)
         rounded = count * np.rint((motion - measured[0]) / count) + measured[0]
         position = position - Lines.of(etfe, recording)(rounded - motion)
-    left = position - spectra.force * fit.response(spectra.frequency_hz)
-    slopes = noise_slopes(spectra, left)
-    etfe = replace(etfe, spectra=replace(spectra, position=position, noise_slope=slopes))
+    closer = replace(spectra, position=position)
+    slopes = noise_slopes(closer, closer.left(fit.response))
+    etfe = replace(etfe, spectra=replace(closer, noise_slope=slopes))
     return replace(fit, windows=etfe.spectra.windows(fit.response)), etfe
 
 
@@ -119,8 +119,9 @@ def scores(fit: Fit, windows: Windows, changes: Complexes) -> Scores:
     nodes = windows.frequency_hz
     response = fit.response(nodes)
     own, further = windows.design[:, :, : nodes.shape[1]], windows.design[:, :, nodes.shape[1] :]
-    left = windows.target - (own @ response[..., None])[..., 0]
-    moved = np.concatenate([own @ changes, further], axis=2)
+    left = windows.without_common(windows.target - (own @ response[..., None])[None, ..., 0])[0]
+    moved = np.moveaxis(np.concatenate([own @ changes, further], axis=2), 2, 0)
+    moved = np.moveaxis(windows.without_common(moved), 0, 2)
     power = windows.scatter + np.sum(np.abs(left) ** 2, axis=1)
     weight = 2 * (windows.lines - 1) / power
     along = np.einsum("wkc,wk->wc", moved.conj(), left)

@@ -56,6 +56,15 @@ def interpolation(position: NDArray[Any]) -> NDArray[Any]:
     return np.stack([x * (x - 1) / 2, 1 - x**2, x * (x + 1) / 2], axis=-1)
 
 
+def interpolation_at(nodes: NDArray[Any], position: NDArray[Any]) -> NDArray[Any]:
+    """Weights of the polynomial through the values at any nodes, shape (..., w, k): Lagrange's."""
+    weights = np.ones((*position.shape, len(nodes)))
+    for i, node in enumerate(nodes):
+        for other in np.delete(nodes, i):
+            weights[..., i] *= (position - other) / (node - other)
+    return weights
+
+
 def project_out(basis: NDArray[Any], columns: NDArray[Any]) -> NDArray[Any]:
     """What is left of the columns (..., w, c) outside the span of the basis (..., w, b)."""
     if np.iscomplexobj(columns) and not np.iscomplexobj(basis):

@@ -89,6 +89,11 @@ class RandomSpectra:
         high = self.frequency_hz[self.edges[1:] - 1, None]
         return (low + high) / 2 + (high - low) / 2 * NODES
 
+    @property
+    def middle_hz(self) -> NDArray[Any]:
+        """The middle of each window, shape (W,)."""
+        return np.asarray(self.nodes_hz[:, self.nodes_hz.shape[1] // 2])
+
     @cached_property
     def blocks(self) -> list[Block]:
         """All windows, those of similar width together."""
@@ -105,7 +110,7 @@ class RandomSpectra:
         line, inside, x, frequency = self._lines(window)
         whitened = inside.astype(float)
         if self.noise_slope is not None:
-            middle = self.nodes_hz[window, 1:2]
+            middle = self.middle_hz[window, None]
             whitened *= (frequency / middle) ** (self.noise_slope[window, None] / 2)
         terms = self._leakage(window, x, frequency)
         leakage = np.linalg.qr(terms * whitened[..., None])[0] * np.any(terms, -2, keepdims=True)
@@ -117,8 +122,12 @@ class RandomSpectra:
             force=self.force[line] * whitened,
             position=project_out(leakage, position[..., None])[..., 0],
             leakage=leakage,
-            weights=interpolation(x),
+            weights=self._interpolation(x),
         )
+
+    def _interpolation(self, x: NDArray[Any]) -> NDArray[Any]:
+        """Weights of the nodes at places in a window, (W, w, k)."""
+        return interpolation(x)
 
     def _lines(self, window: slice) -> tuple[NDArray[Any], ...]:
         """Of windows side by side, (W, w) each: which lines, and that they are no padding.

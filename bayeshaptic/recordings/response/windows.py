@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,9 @@ from numpy.typing import NDArray
 
 Reference = Callable[[NDArray[Any]], NDArray[Any]]
 """A frequency response: frequencies in Hz, shape (L,), to complex values, shape (L,)."""
+
+ALIKE = 1e-10
+"""Columns that differ by less count as one: motions of two poles at zero."""
 
 
 def remembered(reference: Reference) -> Reference:
@@ -52,6 +56,9 @@ class Windows:
         Variance of a line's noise as a first fit leaves it; None: as the scatter tells.
     louder : ndarray, shape (W,), or None
         How many times as far a hand would move the device without the forces that were taken off.
+    common : complex ndarray, shape (W, r, S), or None
+        Columns whose S coefficients are real and the same in all windows: whatever suits `target`
+        best. `noise` is known where there are any.
     """
 
     frequency_hz: NDArray[Any]
@@ -61,6 +68,7 @@ class Windows:
     lines: NDArray[Any]
     noise: NDArray[Any] | None = None
     louder: NDArray[Any] | None = None
+    common: NDArray[Any] | None = None
 
     @property
     def offset(self) -> NDArray[Any] | float:
@@ -72,9 +80,51 @@ class Windows:
         return 0.0 if self.louder is None else 2 * (self.lines - 1) * np.log(self.louder)
 
     @property
+    def places_hz(self) -> NDArray[Any]:
+        """Where each number of `target` is drawn, shape (W, r): at a node, the rest amid these."""
+        nodes = self.frequency_hz
+        further = self.target.shape[1] - nodes.shape[1]
+        middle = np.repeat(nodes.mean(axis=1, keepdims=True), max(further, 0), axis=1)
+        return np.concatenate([nodes, middle], axis=1)
+
+    @property
     def inputs(self) -> int:
         """J, the number of further inputs."""
         return self.design.shape[2] - self.frequency_hz.shape[1]
+
+    def without_common(self, left: NDArray[Any]) -> NDArray[Any]:
+        """Deviations less what of them the common columns make, both of shape (B, W, r).
+
+        Coefficients with a flat prior, integrated out: the likelihood is that of the best ones.
+        """
+        if self.common is None:
+            return left
+        from bayeshaptic.recordings.response.common_kernel import take_off
+
+        assert self.noise is not None
+        sd = np.sqrt(self.noise)[:, None]
+        white = np.ascontiguousarray(left / sd).view(float).reshape(len(left), -1)
+        directions = self._common_directions
+        take_off(directions, np.ascontiguousarray(directions.T), white)
+        return np.asarray(white.view(complex).reshape(left.shape) * sd)
+
+    @property
+    def common_freedom(self) -> NDArray[Any] | float:
+        """Complex lines of each window that the common columns take, shape (W,), or 0."""
+        if self.common is None:
+            return 0.0
+        taken = np.sum(self._common_directions**2, axis=0)
+        return np.asarray(0.5 * taken.reshape(len(self.lines), -1).sum(axis=1))
+
+    @cached_property
+    def _common_directions(self) -> NDArray[Any]:
+        """Orthonormal rows that span the common columns over the noise, as real numbers."""
+        assert self.common is not None and self.noise is not None
+        white = self.common / np.sqrt(self.noise)[:, None, None]
+        columns = np.moveaxis(white, 2, 0).copy().view(float).reshape(white.shape[2], -1)
+        columns /= np.linalg.norm(columns, axis=1, keepdims=True)
+        _, size, directions = np.linalg.svd(columns, full_matrices=False)
+        return np.ascontiguousarray(directions[size > ALIKE * size[0]])
 
     def part(self, chosen: NDArray[Any]) -> Windows:
         """Some of the windows, by a mask or an index."""
@@ -86,6 +136,7 @@ class Windows:
             self.lines[chosen],
             None if self.noise is None else self.noise[chosen],
             None if self.louder is None else self.louder[chosen],
+            None if self.common is None else self.common[chosen],
         )
 
     def after(self, others: Windows) -> Windows:

@@ -42,7 +42,7 @@ def noise_slopes(spectra: RandomSpectra, left: Complexes | None = None) -> Float
     neighbours = 4
     count = min(wide + neighbours, len(first))
     likelihood, level = _with_each_power(spectra, count, left)
-    log_f = np.log(spectra.nodes_hz[:count, 1])
+    log_f = np.log(spectra.middle_hz[:count])
     found = np.zeros(count)
     rounds = 3
     for _ in range(rounds):
