@@ -70,6 +70,7 @@ def join_recordings(
         source=None,
         notices=(*notices, Notice("note", "pieces", text)),
         joints=tuple(int(end) for end in ends[:-1]),
+        joined=tuple(piece.name for piece in pieces),
         reference=_references(pieces),
         sensed=_sensed(pieces),
     )

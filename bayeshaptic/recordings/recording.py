@@ -64,6 +64,8 @@ class Recording(Shown):
     joints : tuple of int
         Samples at which a further piece begins, where several recordings are joined
         (`bayeshaptic.join_recordings`); nothing is known of the time between them.
+    joined : tuple of str
+        The names of its pieces, where several recordings are joined.
     reference : ndarray, shape (N,), or None
         What the controller followed, in any unit, where it was written down: it moves the force,
         and nothing of the motion moves it.
@@ -88,6 +90,7 @@ class Recording(Shown):
     notices: tuple[Notice, ...] = ()
     feedback: Feedback | None = None
     joints: tuple[int, ...] = ()
+    joined: tuple[str, ...] = ()
     reference: NDArray[np.float64] | None = field(default=None, repr=False)
     sensed: Sensed | None = None
 
@@ -110,10 +113,16 @@ class Recording(Shown):
 
     @property
     def pieces(self) -> tuple[Recording, ...]:
-        """Its pieces, each a recording of its own; itself where it is one."""
+        """Its pieces, each a recording of its own name; itself where it is one."""
         if not self.joints:
             return (self,)
-        return tuple(self.part(span.start, span.stop) for span in self.spans)
+        spans = self.spans
+        known = self.joined if len(self.joined) == len(spans) else ()
+        names = known or tuple(f"{self.name}, piece {n}" for n in range(1, len(spans) + 1))
+        return tuple(
+            replace(self.part(span.start, span.stop), name=name, joined=())
+            for span, name in zip(spans, names, strict=True)
+        )
 
     @property
     def spans(self) -> tuple[slice, ...]:

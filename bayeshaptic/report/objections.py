@@ -18,6 +18,7 @@ from bayeshaptic.quantities import percent, pure, quantity
 from bayeshaptic.recordings.checks.loop_period import doubts_of_the_loop, rows_are_uneven
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.checks.units_in_doubt import in_doubt
+from bayeshaptic.recordings.checks.unlike_pieces import named_unlike
 from bayeshaptic.recordings.feedback import has_feedback, how_computed, is_certain
 from bayeshaptic.recordings.signals.other_outputs import NO_LOOP
 from bayeshaptic.recordings.units import is_assumed
@@ -137,6 +138,11 @@ def _of_the_recording(analysis: Analysis, diagnosis: Any, verdict: str | None) -
     found = []
     found += _of_the_units(analysis)
     found += doubts_of_the_loop(analysis.notices)
+    if unlike := named_unlike(analysis.notices):
+        found.append(
+            f"the pieces that count together do not have one response ({', '.join(unlike)}), as "
+            "those of one device have"
+        )
     if analysis.in_loop is not None:
         found += [*analysis.in_loop.doubts, *analysis.in_loop.questions]
     if has_feedback(analysis.notices) and analysis.in_loop is None:

@@ -15,6 +15,7 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.models import Model
 from bayeshaptic.recordings.checks.check import check_recording, check_table
 from bayeshaptic.recordings.checks.sufficiency import refuse_where_told, told_too_little, too_little
+from bayeshaptic.recordings.checks.unlike_pieces import unlike_pieces
 from bayeshaptic.recordings.feedback import has_feedback, told
 from bayeshaptic.recordings.join import unbroken
 from bayeshaptic.recordings.recording import Recording
@@ -91,6 +92,7 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
             if not any(notice.topic == "feedback" for notice in notices):
                 notices += _first_of_the_period(whole, too_little(whole))
                 if not one_mass:
+                    _refuse_unlike(measurement, options.band_hz, notices)
                     refuse_where_told(whole, notices)
         with clock.stage("frequency response"):
             options.report(0.03, "estimating the frequency response")
@@ -98,6 +100,8 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
             if len(etfe.parts) == 1 and not (one_mass or has_feedback(notices)):
                 # Where nothing is followed in time, the other pieces have no part in what follows.
                 etfe = replace(etfe.parts[0], notices=etfe.notices)
+            if not has_feedback(notices):
+                notices += unlike_pieces(etfe)
             notices += _not_looked_for(etfe.recording, notices)
     else:
         etfe = measurement
@@ -118,6 +122,23 @@ def _with_what_was_followed(
     if recording.reference is not None and has_feedback(notices):
         notices += (_NEEDS_NONE,)
     return replace(recording, reference=None), notices
+
+
+def _refuse_unlike(
+    recording: Recording, band_hz: tuple[float, float] | None, notices: tuple[Notice, ...]
+) -> None:
+    """Refuse pieces of several devices as such, where together they seem to say too little.
+
+    With the signs of some turned round, say, they hardly answer to the force.
+    """
+    if told_too_little(notices) is None or not recording.joints:
+        return
+    try:
+        found = unlike_pieces(estimate_etfe(recording, band_hz))
+    except InputError:
+        return
+    if found:
+        raise InputError(f"{recording.name}: {found[0].text}", topic="pieces")
 
 
 def _first_of_the_period(recording: Recording, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
