@@ -56,6 +56,28 @@ def test_motion_that_repeats_has_lines_of_its_own(period: int) -> None:
     assert uneven_rows(force, moved, 1e-3, True) is None
 
 
+def test_a_cascade_of_two_rates_is_named_beside_rows_that_are_uneven() -> None:
+    """An inner loop at every row, and an outer one that tells it a speed at every fourth."""
+    rng = np.random.default_rng(9)
+    places = np.repeat(rng.uniform(-1, 1, ROWS // 600), 600)
+    wanted = lfilter([0.02**2], [1, -1.96, 0.98**2], places)
+    read, force = np.zeros(ROWS), np.zeros(ROWS)
+    moved = speed = told = seen = 0.0
+    for k in range(1, ROWS):
+        moved, speed = moved + speed, 0.995 * speed + 0.1 * force[k - 1]
+        read[k] = 1e-3 * np.round(moved / 1e-3)
+        seen += 0.12 * (read[k] - read[k - 1] - seen)
+        if k % 4 == 0:
+            told = 0.02 * (wanted[k] - read[k])
+        force[k] = 0.3 * (told - seen)
+    stamps = 1e-3 * np.arange(ROWS)
+    found = recording_from_arrays(force, read, time=stamps)
+    (doubt,) = doubts_of_the_loop(found.notices)
+    assert "outer loop runs at every few" in doubt
+    said = recording_from_arrays(force, read, 1e-3, time=stamps)
+    assert not doubts_of_the_loop(said.notices)
+
+
 def test_a_position_that_never_changes_says_nothing_of_its_rows() -> None:
     force = np.random.default_rng(5).standard_normal(ROWS)
     assert uneven_rows(force, np.zeros(ROWS), 1e-3, True) is None
@@ -73,6 +95,6 @@ def test_a_page_asks_for_every_row_and_gives_no_other_reason() -> None:
     )
     closed = close_loop(found, "free", hidden=False)
     said = headline(closed)
-    assert said.status == "untrusted" and said.sentence.endswith("of another rate.")
+    assert said.status == "untrusted" and said.sentence.endswith("with --period-s.")
     every, alone = next_steps(said, closed)
     assert "every row" in every.text and alone.command.endswith("--period-s 0.001")

@@ -26,7 +26,8 @@ def doubts_of_the_loop(notices: Iterable[Notice]) -> list[str]:
     if rows_are_uneven(told):
         return [
             "its rows are not evenly apart in time, as where a log writes the newest row of a loop "
-            "of another rate"
+            "of another rate, or a controller's outer loop runs at every few of them only: then "
+            "say the period of the rows with --period-s"
         ]
     if not any(n.topic == "period" and LOOP in n.about for n in told):
         return []
