@@ -102,9 +102,11 @@ class LimitKnown:
         """What was found of these chains while they were shorter.
 
         None of others: a proposal that is fitted again begins new ones, which may never be looked
-        at because they do not converge.
+        at because they do not converge, and of chains that mix badly every other step is thrown
+        away.  All steps are compared: walkers that have not moved yet begin alike.
         """
-        same = self.limit is not None and np.array_equal(self._seen[:, 0], chains[:, 0])
+        steps = min(self._seen.shape[1], chains.shape[1])
+        same = self.limit is not None and np.array_equal(self._seen[:, :steps], chains[:, :steps])
         return self.limit if same else None
 
     def _risks(self, limit: CriticalStiffness, chains: Floats) -> float:

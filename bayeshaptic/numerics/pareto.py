@@ -64,8 +64,13 @@ class ParetoTail:
         return float((own + 2 * (1 + k) * (scale * by_scale) ** 2) / draws)
 
 
+def first_quartile(excess: Floats) -> float:
+    """What a fit is scaled by, which must not be zero: many draws may be at the threshold."""
+    return float(excess[max(int(len(excess) / 4 + 0.5) - 1, 0)])
+
+
 def fit_pareto(excess: Floats) -> ParetoTail:
-    """Fit a tail to `excess`, positive and in ascending order, shape (n,).
+    """Fit a tail to `excess` of shape (n,), ascending, and positive from the first quartile on.
 
     J. Zhang and M. A. Stephens, "A new and efficient estimation method for the generalized Pareto
     distribution", Technometrics 51 (2009).
@@ -73,7 +78,7 @@ def fit_pareto(excess: Floats) -> ParetoTail:
     count = len(excess)
     points = 30 + int(np.sqrt(count))
     b = 1 - np.sqrt(points / (np.arange(1, points + 1) - 0.5))
-    b = b / (3 * excess[int(count / 4 + 0.5) - 1]) + 1 / excess[-1]
+    b = b / (3 * first_quartile(excess)) + 1 / excess[-1]
     k = np.mean(np.log1p(-b[:, None] * excess), axis=1)
     level = count * (np.log(-b / k) - k - 1)
     with np.errstate(over="ignore"):  # of a point without a share

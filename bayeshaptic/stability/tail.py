@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bayeshaptic.numerics.pareto import fit_pareto
+from bayeshaptic.numerics.pareto import first_quartile, fit_pareto
 from bayeshaptic.types import Floats
 
 ENOUGH_BELOW = 20  # effective draws below a quantile that is stated as it is
@@ -131,7 +131,7 @@ def _fitted(
     if worth < fewest or not np.isfinite(threshold):
         return None
     excess = (threshold - ordered[:count])[::-1]
-    if not excess[count // 4] > 0:
+    if not first_quartile(excess) > 0:
         return None
     tail = fit_pareto(excess).towards_exponential(worth)
     off = np.abs(np.arange(0.5, count) / count - (1 - tail.above(excess))).max()

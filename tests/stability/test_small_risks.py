@@ -138,6 +138,26 @@ def test_what_was_found_of_all_draws_is_not_taken_for_what_a_thinned_run_holds()
     assert np.array_equal(fresh.samples, resumed.samples)
 
 
+def test_what_was_found_is_not_taken_for_that_of_thinned_chains_that_begin_alike():
+    """Walkers that have not moved yet: the first steps of both are the same, and others are not."""
+    whole = independent(64)
+    whole = Chains(whole.model, np.concatenate([whole.chains[:, [0, 0]], whole.chains], axis=1))
+    rule = LimitKnown(whole.model)
+    rule(whole.chains)
+    thinned = Chains(whole.model, whole.chains[:, 1::2])
+    again = rule.limit_of(thinned)
+    assert np.array_equal(again.samples, critical_stiffness(thinned).samples)
+    assert again.confirmed == again.checked
+
+
+def test_a_tail_whose_first_quarter_is_at_its_threshold_is_not_fitted():
+    """A fit is scaled by that quartile, and divided by nothing."""
+    samples = np.sort(1 + np.random.default_rng(0).random(10_000))
+    count = 500  # the lowest twentieth
+    samples[count - 125 : count] = samples[count]
+    assert low_quantile(samples, 0.01, lambda _: 900.0) is None
+
+
 @pytest.fixture(scope="module")
 def recorded():
     bench = Bench.from_device("lhifam")
