@@ -53,6 +53,13 @@ def test_a_force_repeats_but_for_its_noise() -> None:
     assert find_repetition(one + 0.1 * one.std() * noise, noise=0.0) is None
 
 
+def test_a_slow_force_of_a_fast_loop_does_not_repeat() -> None:
+    """Two samples before it was what it is, to a thousandth, and nothing of it comes again."""
+    smooth = np.cos(0.2 * T) + 0.7 * np.cos(0.2 * np.sqrt(2) * T)
+    assert np.abs(smooth[2:] - smooth[:-2]).max() < 1e-3 * smooth.std()
+    assert find_repetition(smooth) is None
+
+
 def test_sweeps_of_a_part_of_a_sample_more_do_not_repeat() -> None:
     assert find_repetition(chirp(T % 3.33333, 0.5, 3.33333, 200.0)) is None
 

@@ -69,7 +69,8 @@ def find_repetition(
         start, end = longest(same)
         stop = end + period
         enough = end - start >= period and stop - start >= samples / 2
-        if enough and centred[start:stop].std() > 0.1 * sd:
+        # A slow force of a fast loop is what it was two samples before, to the tolerance.
+        if enough and centred[start : start + period].std() > 0.1 * sd:
             return Repetition(start, stop, int(period))
     for period in candidates if noise > 0 else ():
         count = samples // period
