@@ -100,7 +100,7 @@ def opened(measurement: Recording | Etfe, model: str | Model, options: Options) 
             if len(etfe.parts) == 1 and not (one_mass or has_feedback(notices)):
                 # Where nothing is followed in time, the other pieces have no part in what follows.
                 etfe = replace(etfe.parts[0], notices=etfe.notices)
-            if not has_feedback(notices):
+            if not (has_feedback(notices) or etfe.through_reference):
                 notices += unlike_pieces(etfe)
             notices += _not_looked_for(etfe.recording, notices)
     else:
