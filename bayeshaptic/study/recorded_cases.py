@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayeshaptic.diagnosis.analysis import Analysis
+from bayeshaptic.effects.library import registered
 from bayeshaptic.errors import Notice
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.quantities import interval
@@ -132,9 +133,19 @@ def contradictions(free: Sequence[Analysed]) -> tuple[Notice, ...]:
     ]
     for label, some in found.items():
         kinds = {one.effects: [o.name for o in some if o.effects == one.effects] for one in some}
-        if len(kinds) > 1:
+        if len({_told_apart(effects) for effects in kinds}) > 1:
             texts.append(_other_effects(label, kinds))
     return tuple(Notice("warning", "contradiction", text) for text in texts)
+
+
+def _told_apart(effects: Sequence[str]) -> tuple[str, ...]:
+    """Effects as far as a recording tells them apart, one name for all that are tied.
+
+    Whether the force follows late or the position is read late, say, is chance: two recordings of
+    one device may have either.
+    """
+    known = registered()
+    return tuple(sorted(min((name, *getattr(known.get(name), "ties", ()))) for name in effects))
 
 
 def _other_effects(label: str, kinds: Mapping[tuple[str, ...], Sequence[str]]) -> str:

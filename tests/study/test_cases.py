@@ -185,6 +185,20 @@ def test_an_effect_in_one_recording_of_a_device_and_not_in_another_is_told() -> 
     assert labels[0] == f"nobody holds it ({some[0].name} and 1 other)"
 
 
+def test_effects_that_no_recording_tells_apart_do_not_contradict_each_other() -> None:
+    """A lag on either side of the masses: that they did not agree about the device was said."""
+    some = fake_study(people=0, free=3).recordings
+
+    def named(*effects: tuple[str, ...]) -> tuple[Any, ...]:
+        results = (SimpleNamespace(analysis=some[0].analysis, effect_names=e) for e in effects)
+        return tuple(replace(one, result=r) for one, r in zip(some, results, strict=True))
+
+    assert not contradictions(named(("actuator_lag",), ("position_filter",), ("actuator_lag",)))
+    rubbing = ("coulomb_friction", "position_filter")
+    (warning,) = contradictions(named(("actuator_lag",), rubbing, ("position_filter",)))
+    assert "coulomb_friction, position_filter in" in warning.text
+
+
 def test_a_user_with_two_names_is_asked_about() -> None:
     people = fake_study(people=3, free=1).recordings
     assert not _two_names(people)
