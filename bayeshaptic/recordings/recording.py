@@ -117,7 +117,7 @@ class Recording(Shown):
         if not self.joints:
             return (self,)
         spans = self.spans
-        known = self.joined if len(self.joined) == len(spans) else ()
+        known = self.joined if len(set(self.joined)) == len(spans) else ()
         names = known or tuple(f"{self.name}, piece {n}" for n in range(1, len(spans) + 1))
         return tuple(
             replace(self.part(span.start, span.stop), name=name, joined=())

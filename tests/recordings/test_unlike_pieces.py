@@ -73,6 +73,13 @@ def test_of_two_that_differ_each_is_named_beside_the_other() -> None:
     assert "day 2" in notice.text
 
 
+def test_pieces_of_one_name_are_numbered() -> None:
+    heavier = replace(BENCH, values={"m": 2.6, "b": 12.0})
+    some = recorded(1), recorded(2, bench=heavier), recorded(3)
+    (notice,) = warned(*(replace(one, name="array") for one in some))
+    assert named_unlike([notice]) == ("array and 2 others, piece 2",)
+
+
 def test_no_stiffness_follows_from_them() -> None:
     heavier = replace(BENCH, values={"m": 2.3, "b": 12.0})
     joined = join_recordings([recorded(1), recorded(2, bench=heavier), recorded(3)])
