@@ -132,8 +132,7 @@ class RandomSpectra:
     def _lines(self, window: slice) -> tuple[NDArray[Any], ...]:
         """Of windows side by side, (W, w) each: which lines, and that they are no padding.
 
-        And where in their window they are, from -1 to 1, and their frequencies; padding repeats the
-        last line.
+        And where in their window, from -1 to 1, and at what frequency; padding repeats the last.
         """
         start, width = self.edges[:-1][window, None], np.diff(self.edges)[window, None]
         offset = np.arange(width.max())
@@ -180,10 +179,9 @@ class RandomSpectra:
     def free(
         self, window: slice, response: bool
     ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-        """Windows side by side: lines, which are no padding, and what leakage may make of them.
+        """Windows side by side: lines (W, w), which are no padding, and leakage, (W, w, 5 or 6).
 
-        Shapes (W, w), (W, w) and (W, w, 5 or 6).  With `response` also what a window's own response
-        may make, (W, w, 8 or 9).
+        With `response` also what a window's own response may make, (W, w, 8 or 9).
         """
         line, inside, x, frequency = self._lines(window)
         columns = self._leakage(window, x, frequency)
