@@ -131,6 +131,11 @@ class Etfe(Shown):
         return isinstance(self.spectra, DirectSpectra)
 
     @property
+    def leaks_free_motion(self) -> bool:
+        """Whether all leakage is taken for the device's own free motion: see `DirectSpectra`."""
+        return isinstance(self.spectra, DirectSpectra) and self.spectra.free_motions is not None
+
+    @property
     def relative_sd(self) -> NDArray[Any]:
         """Standard deviation over the magnitude of the estimate, shape (L,)."""
         return np.sqrt(self.variance) / np.abs(self.value)

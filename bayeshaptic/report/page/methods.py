@@ -106,6 +106,11 @@ def _measured(etfe: Etfe) -> tuple[str, ...]:
             ", every line up to the Nyquist frequency counting alike, so that feedback does not "
             "bias the fit (the direct method [ljung1999])"
         )
+    if etfe.leaks_free_motion:
+        how += (
+            "; what leaks, because the record does not end as it began, is the free motion of the "
+            "device, with the poles of the fit"
+        )
     return (
         f"The device's response to a commanded force was recorded for {length} at {rate}, and "
         f"estimated {how} with its noise ({band}).",
