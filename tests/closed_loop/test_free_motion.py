@@ -104,6 +104,7 @@ def test_the_limit_is_known_as_well_as_it_can_be():
     assert abs(np.mean(limit)) < 3 * np.std(limit)
     assert 0.8 < np.std(limit) / least < 1.27
     assert analysis.fit.residual.shape == analysis.fit.frequency_hz.shape
+    assert analysis.etfe.leaks_free_motion
     by_windows = critical_stiffness(draws_around(fitted(recording).fit, 1)).samples
     assert np.std(20 * np.log10(by_windows)) > 3 * least
 

@@ -106,15 +106,15 @@ def _measured(etfe: Etfe) -> tuple[str, ...]:
             ", every line up to the Nyquist frequency counting alike, so that feedback does not "
             "bias the fit (the direct method [ljung1999])"
         )
-    if etfe.leaks_free_motion:
-        how += (
-            "; what leaks, because the record does not end as it began, is the free motion of the "
-            "device, with the poles of the fit"
-        )
-    return (
+    found = (
         f"The device's response to a commanded force was recorded for {length} at {rate}, and "
-        f"estimated {how} with its noise ({band}).",
+        f"estimated {how} with its noise ({band})."
     )
+    leaking = (
+        "What leaks, because the record does not end as it began, was taken for the device's own "
+        "free motion, with the poles of the fit."
+    )
+    return (found, leaking) if etfe.leaks_free_motion else (found,)
 
 
 def _in_loop(analysis: Analysis) -> str:
