@@ -41,8 +41,8 @@ def limit_log(fit: Fit, theta: np.ndarray) -> float:
 
 def test_what_a_force_moves_is_what_a_fit_with_it_moves() -> None:
     bench, _, recording = loop(8)
-    closed = close_loop(recording, "free", hidden=False, delay_s=bench.delay_s)
-    fit, etfe = closed.analysis.fit, closed.analysis.etfe
+    state = close_loop(recording, "free", hidden=False, delay_s=bench.delay_s).traced.state
+    fit, etfe = state.fit, state.etfe
     name = "v^3"
     (test,) = (one for one in causal_tests(fit, etfe) if one.name == name)
     assert test.force is not None and len(test.force.moves) == fit.model.size
