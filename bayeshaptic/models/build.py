@@ -8,8 +8,8 @@ from dataclasses import replace
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.devices import Device
 from bayeshaptic.errors import InputError
-from bayeshaptic.models.model import Model, before_delay
-from bayeshaptic.models.parameter import Parameter
+from bayeshaptic.models.model import Model
+from bayeshaptic.models.parameter import Parameter, before_delay
 from bayeshaptic.models.prior import HalfNormal, LogNormal, Normal, Prior
 from bayeshaptic.models.prior_of_zero import NearZero
 from bayeshaptic.models.structures import (

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError
 from bayeshaptic.models.joint_prior import JointPrior, joint_prior
-from bayeshaptic.models.parameter import Parameter, unit_of
+from bayeshaptic.models.parameter import Parameter, before_delay, unit_of
 from bayeshaptic.models.prior import Prior
 from bayeshaptic.models.response.system import Complexes, Floats, LinearSystem
 from bayeshaptic.models.structures import Structure
@@ -295,8 +295,3 @@ class Model(Shown):
             f"force in {pretty_unit(self.force_unit)}, position in {self.position_unit}; "
             f"period {period}, delay {known}",
         )
-
-
-def before_delay(known: Iterable[Parameter], added: Iterable[Parameter]) -> tuple[Parameter, ...]:
-    """Parameters with more of them, which come before the delay: it stays the last."""
-    return tuple(sorted((*known, *added), key=lambda parameter: parameter.name == "delay_s"))

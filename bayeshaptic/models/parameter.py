@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from bayeshaptic.errors import InputError
@@ -104,3 +105,8 @@ class Parameter:
             most = f", up to {high:g}" if high < math.inf else ""
             raise InputError(f"{self.name} is {value:g}; a {self.title} can be {can_be}{most}")
         return float(value)
+
+
+def before_delay(known: Iterable[Parameter], added: Iterable[Parameter]) -> tuple[Parameter, ...]:
+    """Parameters with more of them, which come before the delay: it stays the last."""
+    return tuple(sorted((*known, *added), key=lambda parameter: parameter.name == "delay_s"))

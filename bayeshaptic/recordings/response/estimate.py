@@ -12,6 +12,7 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.read import recording_of
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.band import refuse_band
+from bayeshaptic.recordings.response.estimators.joined import JoinedSpectra
 from bayeshaptic.recordings.response.estimators.periodic_excitation import estimate_periodic
 from bayeshaptic.recordings.response.estimators.random_excitation import (
     estimate_direct,
@@ -19,7 +20,7 @@ from bayeshaptic.recordings.response.estimators.random_excitation import (
 )
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.points import Points
-from bayeshaptic.recordings.response.spectra import JoinedSpectra, PeriodicSpectra, RandomSpectra
+from bayeshaptic.recordings.response.spectra import PeriodicSpectra, RandomSpectra
 from bayeshaptic.recordings.signals.excitation import FEWEST_LINES
 from bayeshaptic.recordings.signals.lone import without_lone
 from bayeshaptic.threads import single_threaded

@@ -18,12 +18,8 @@ from bayeshaptic.recordings.response.estimators.instrument import (
     STRONG,
     InstrumentSpectra,
 )
-from bayeshaptic.recordings.response.spectra import (
-    JoinedSpectra,
-    PeriodicSpectra,
-    RandomSpectra,
-    Spectra,
-)
+from bayeshaptic.recordings.response.estimators.joined import JoinedSpectra
+from bayeshaptic.recordings.response.spectra import PeriodicSpectra, RandomSpectra, Spectra
 from bayeshaptic.recordings.response.table_spectra import TableSpectra
 from bayeshaptic.recordings.response.windows import Reference, Windows
 from bayeshaptic.shown import Shown, data_frame

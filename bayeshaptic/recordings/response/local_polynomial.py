@@ -49,15 +49,16 @@ def leakage_terms(
     return np.stack([one, position, position**2, inverse, inverse**2], axis=-1)
 
 
-def interpolation(position: NDArray[Any]) -> NDArray[Any]:
-    """Weights of the parabola through the values at `NODES`, shape (..., w, 3)."""
+def interpolation(position: NDArray[Any], nodes: NDArray[Any] = NODES) -> NDArray[Any]:
+    """Weights of the polynomial through the values at nodes, by default a parabola, (..., w, k)."""
+    if nodes is not NODES:
+        return _lagrange(position, nodes)
     outer = NODES[2]
     x = position / outer
     return np.stack([x * (x - 1) / 2, 1 - x**2, x * (x + 1) / 2], axis=-1)
 
 
-def interpolation_at(nodes: NDArray[Any], position: NDArray[Any]) -> NDArray[Any]:
-    """Weights of the polynomial through the values at any nodes, shape (..., w, k): Lagrange's."""
+def _lagrange(position: NDArray[Any], nodes: NDArray[Any]) -> NDArray[Any]:
     weights = np.ones((*position.shape, len(nodes)))
     for i, node in enumerate(nodes):
         for other in np.delete(nodes, i):

@@ -82,12 +82,17 @@ class RandomSpectra:
         """Mean power of the force in each window, shape (W,)."""
         return np.add.reduceat(np.abs(self.force) ** 2, self.edges[:-1]) / np.diff(self.edges)
 
+    @property
+    def nodes(self) -> NDArray[Any]:
+        """Places in a window, from -1 to 1, where a model is evaluated, shape (k,)."""
+        return NODES
+
     @cached_property
     def nodes_hz(self) -> NDArray[Any]:
-        """Frequencies of the nodes, shape (W, 3)."""
+        """Frequencies of the nodes, shape (W, k)."""
         low = self.frequency_hz[self.edges[:-1], None]
         high = self.frequency_hz[self.edges[1:] - 1, None]
-        return (low + high) / 2 + (high - low) / 2 * NODES
+        return (low + high) / 2 + (high - low) / 2 * self.nodes
 
     @property
     def middle_hz(self) -> NDArray[Any]:
@@ -122,12 +127,8 @@ class RandomSpectra:
             force=self.force[line] * whitened,
             position=project_out(leakage, position[..., None])[..., 0],
             leakage=leakage,
-            weights=self._interpolation(x),
+            weights=interpolation(x, self.nodes),
         )
-
-    def _interpolation(self, x: NDArray[Any]) -> NDArray[Any]:
-        """Weights of the nodes at places in a window, (W, w, k)."""
-        return interpolation(x)
 
     def _lines(self, window: slice) -> tuple[NDArray[Any], ...]:
         """Of windows side by side, (W, w) each: which lines, and that they are no padding.
@@ -190,7 +191,7 @@ class RandomSpectra:
             at_nodes = np.asarray(self.reference(nodes.ravel())).reshape(nodes.shape)
             at_lines = np.asarray(self.reference(frequency.ravel())).reshape(frequency.shape)
             ratio = at_lines[..., None] / at_nodes[:, None]
-            answer = self.force[line][..., None] * interpolation(x) * ratio
+            answer = self.force[line][..., None] * interpolation(x, self.nodes) * ratio
             columns = np.concatenate([columns, answer], axis=-1)
         return line, inside, columns * inside[..., None]
 
@@ -279,32 +280,4 @@ class PeriodicSpectra:
             target=self.position[:, None],
             scatter=self.scatter,
             lines=self.freedom,
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class JoinedSpectra:
-    """Spectra of the pieces of a recording, each with its own noise.
-
-    Attributes
-    ----------
-    parts : tuple of RandomSpectra, or of PeriodicSpectra
-    """
-
-    parts: tuple[Spectra, ...]
-
-    @property
-    def lines(self) -> int:
-        return sum(part.lines for part in self.parts)
-
-    def windows(
-        self, reference: Reference | None = None, inputs: NDArray[Any] | None = None
-    ) -> Windows:
-        """The windows of all parts, one part after the other; without further inputs."""
-        found = [part.windows(reference) for part in self.parts]
-        return Windows(
-            *(
-                np.concatenate([getattr(windows, name) for windows in found])
-                for name in ("frequency_hz", "design", "target", "scatter", "lines")
-            )
         )

@@ -20,13 +20,11 @@ is what the model leaves, so that a fit weighs its windows anew as it goes on.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayeshaptic.recordings.response.local_polynomial import interpolation_at
 from bayeshaptic.recordings.response.spectra import RandomSpectra
 from bayeshaptic.recordings.response.windows import ALIKE, Reference, Windows
 
@@ -100,19 +98,10 @@ class DirectSpectra(RandomSpectra):
         own = plain.design.shape[2] - len(free)
         return replace(plain, design=plain.design[:, :, :own], common=plain.design[:, :, own:])
 
-    @cached_property
-    def nodes_hz(self) -> NDArray[Any]:
-        """Frequencies of the nodes, shape (W, 3), or (W, 7) beside free motions."""
-        if self.free_motions is None:
-            return super().nodes_hz
-        low = self.frequency_hz[self.edges[:-1], None]
-        high = self.frequency_hz[self.edges[1:] - 1, None]
-        return np.asarray((low + high) / 2 + (high - low) / 2 * _MANY_NODES)
-
-    def _interpolation(self, x: NDArray[Any]) -> NDArray[Any]:
-        if self.free_motions is None:
-            return super()._interpolation(x)
-        return interpolation_at(_MANY_NODES, x)
+    @property
+    def nodes(self) -> NDArray[Any]:
+        """Three in a window, or seven beside free motions."""
+        return super().nodes if self.free_motions is None else _MANY_NODES
 
     def _leakage(self, window: slice, x: NDArray[Any], frequency: NDArray[Any]) -> NDArray[Any]:
         """None beside that of the free motions."""

@@ -10,14 +10,11 @@ from numpy.typing import NDArray
 from bayeshaptic.errors import InputError, Notice, such
 from bayeshaptic.types import Floats
 
-# Standard deviation of the time steps over the period beyond which samples are not evenly spaced:
-# at 10 % the error at a tenth of the Nyquist frequency is 3 % of the signal, more than any device
-# can be known to.
+# Standard deviation of the time steps over the period: at 10 % the error at a tenth of the Nyquist
+# frequency is 3 % of the signal, more than any device can be known to.
 MOST_JITTER = 0.1
-# The median distance from the mean, of normal numbers with a standard deviation of one.
-_USUAL = 0.6745
-# Seconds; a later stamp is damage, even in nanoseconds since 1970, and its square is no number.
-_LATEST = 1e100
+_USUAL = 0.6745  # median distance from the mean, over the standard deviation, of normal numbers
+_LATEST = 1e100  # s: a later stamp is damage, even in ns since 1970, and its square is no number
 # Rows that are missing in one place, and the share of all that are, up to which they are put back:
 # of a force that nobody knows for longer than this its own past says nothing.
 LONGEST_GAP, MOST_MISSING = 8, 0.01
@@ -46,8 +43,8 @@ class Timing:
     period_s : float
         The sampling period.
     jitter : float or None
-        Standard deviation of the time steps over the period; zero where the stamps are those of an
-        even clock, rounded; None without stamps.
+        That of the time steps over the period, as a standard deviation; zero of an even clock's
+        stamps, rounded; None without stamps.
     notices : tuple of Notice
     rows : ndarray of int, shape (N,), or None
         The place of each sample on the clock, where a few in between are missing.
