@@ -29,7 +29,7 @@ from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, run_loop
 from bayeshaptic.types import Floats
-from benchmarks.bounds.two_masses import bound_db
+from benchmarks.bounds import held, two_masses
 from benchmarks.recordings.controllers import controller_of
 from benchmarks.recordings.door import written_down
 
@@ -105,9 +105,10 @@ def one(seed: int, without: bool = False, dithered: bool = False) -> dict[str, A
         "limit_db": [20 * float(np.log10(max(v, 1e-12) / truth)) for v in (low, middle, high)],
         "ranks": _ranks(analysis.posterior.draws, analysis.model, case.bench),
     }
-    if case.bench.mechanism == "free" and analysis.model.name == "free" and not case.friction:
+    if case.bench.mechanism == analysis.model.name and not case.friction:
+        bound = (two_masses if case.bench.mechanism == "free" else held).bound_db
         sd = float(np.std(20 * np.log10(analysis.limit.samples)))
-        found["over_bound"] = sd / bound_db(case.recording, case.bench, analysis.model)
+        found["over_bound"] = sd / bound(case.recording, case.bench, analysis.model)
     return found
 
 
@@ -143,12 +144,14 @@ def summary(found: list[dict[str, Any]]) -> None:
             f"parameters' in {100 * inside:.0f} % of {len(ranks)}"
         )
     told = [one for one in found if one["outcome"] == "recommended" and "over_bound" in one]
-    ratios = np.array([one["over_bound"] for one in told])
-    if len(ratios):
-        print(
-            f"sd of K_CR over the Cramer-Rao bound, free devices: median {np.median(ratios):.2f} "
-            f"of {len(ratios)}, below 1.25 in {100 * np.mean(ratios < 1.25):.0f} %"
-        )
+    for kind in ("free", "held"):
+        ratios = np.array([one["over_bound"] for one in told if f" {kind}, " in one["what"]])
+        if len(ratios):
+            print(
+                f"sd of K_CR over the Cramer-Rao bound, {kind} devices: median "
+                f"{np.median(ratios):.2f} of {len(ratios)}, below 1.25 in "
+                f"{100 * np.mean(ratios < 1.25):.0f} %"
+            )
 
 
 def main(count: int, path: Path, without: bool, dithered: bool) -> None:

@@ -270,6 +270,9 @@ def test_a_doubt_of_feedback_is_no_certainty(monkeypatch: pytest.MonkeyPatch) ->
         monkeypatch.setattr(what_drives_what, "causality", lambda _, found=found: found)
         notices = check_recording(held())
         assert topics(notices) == ["feedback"] and is_certain(notices) == has_feedback
+        assert "opposite sign" not in notices[0].text
+        turned = check_recording(changed(position=-held().position))  # a controller opposes, too
+        assert topics(turned) == ["feedback"] and "opposite sign" in turned[0].text
 
 
 @pytest.mark.parametrize(

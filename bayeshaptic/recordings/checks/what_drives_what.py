@@ -13,6 +13,11 @@ from bayeshaptic.recordings.signals.causality.causality import Causality, causal
 from bayeshaptic.recordings.signals.controller import share_by_a_law
 from bayeshaptic.recordings.signals.rough_response import RoughResponse
 
+_AGAINST = (
+    " The position goes against the force: if this was an open loop, one of them has the opposite "
+    "sign; turn it round with --columns, as in position=NAME*-1."
+)
+
 
 def what_drives_what(recording: Recording, rough: RoughResponse, where: str) -> list[Notice]:
     """What drives what; of a measured force, whose past its motion knows better, the sign alone.
@@ -32,7 +37,8 @@ def what_drives_what(recording: Recording, rough: RoughResponse, where: str) -> 
     if found.swapped and not measured:
         raise _swapped(found, where)
     against = not found.relay and rough.opposite(recording.period_s)
-    if measured or found.opposite or (against and not found.has_feedback):
+    # A controller opposes the motion, too.
+    if measured or found.opposite or (against and not (found.has_feedback or found.doubtful)):
         raise _turned_round(where)
     if found.relay:
         raise _relay(recording, where)
@@ -43,7 +49,7 @@ def what_drives_what(recording: Recording, rough: RoughResponse, where: str) -> 
         law = f"in {percent(share)} of the samples a linear law of {known} makes it exactly"
         return [_feedback(law, against)]
     if found.doubtful:
-        return [_doubt(found.evidence)]
+        return [_doubt(found.evidence, against)]
     own = recording.sensed is None or recording.sensed.derivatives == 0
     if own and rough.is_velocity(recording.period_s) and _pushes_a_velocity(recording):
         raise _velocity(where)
@@ -124,21 +130,18 @@ def _feedback(evidence: str, against: bool, far_past: bool = False) -> Notice:
             "come (filtfilt, splines) knows the force before it acts, and looks the same: then "
             "give the position as it was read."
         )
-    if against:
-        text += (
-            " The position goes against the force: if this was an open loop, one of them has the "
-            "opposite sign; turn it round with --columns, as in position=NAME*-1."
-        )
+    text += _AGAINST if against else ""
     return Notice("warning", "feedback", text, (OR_NOISE,) if far_past else ())
 
 
-def _doubt(evidence: str) -> Notice:
+def _doubt(evidence: str, against: bool) -> Notice:
     """That it may have been."""
     text = (
         f"It cannot be decided whether the force was computed from the motion ({evidence}, more "
         "than chance but little). If the recording was made in closed loop, the ETFE, the fit and "
         "K_CR are biased: record again with a force that does not depend on the motion, and longer."
     )
+    text += _AGAINST if against else ""
     return Notice("warning", "feedback", text, (UNDECIDED,))
 
 
