@@ -26,6 +26,7 @@ from bayeshaptic.effects.nonlinear.shapes import (
     LOAD_VELOCITY,
     POSITION,
     STRETCH,
+    STRETCH_VELOCITY,
     VELOCITY,
     Shape,
 )
@@ -42,6 +43,7 @@ _ENDS = {
     LOAD_VELOCITY: (MASSES[BODY], None, True),
     POSITION: (MASSES[MOTOR], None, False),
     STRETCH: (MASSES[MOTOR], MASSES[BODY], False),
+    STRETCH_VELOCITY: (MASSES[MOTOR], MASSES[BODY], True),
 }
 _STRENGTH = "unseen_force"
 

@@ -25,6 +25,7 @@ from bayeshaptic.effects.nonlinear.shapes import (
     LOAD_VELOCITY,
     POSITION,
     STRETCH,
+    STRETCH_VELOCITY,
     VELOCITY,
 )
 from bayeshaptic.inference.fit import Fit
@@ -205,7 +206,7 @@ def motions(fit: Fit, recording: Recording) -> dict[str, Floats]:
     found = {VELOCITY: velocity, POSITION: position, ALONG: position}
     if len(fit.model.system(fit.theta).mechanism.masses) > 1:
         motor, load = commanded_motions(fit, recording, (0, 1))
-        found[STRETCH] = motor[0] - load[0]
+        found[STRETCH], found[STRETCH_VELOCITY] = motor - load
         found[LOAD_VELOCITY] = load[1] + velocity - motor[1]  # what is slow moves both
     found[COMMAND] = recording.force - recording.force.mean()
     return found
@@ -216,7 +217,7 @@ def response_to(fit: Fit, over: str, s: Complexes) -> Complexes:
 
     What filters the position filters what forces do, and an actuator's lag does not.
     """
-    if over == STRETCH:
+    if over in (STRETCH, STRETCH_VELOCITY):
         return pair_response(fit, s)
     if over == COMMAND:
         return np.asarray(fit.response(s.imag / (2 * np.pi)))

@@ -53,7 +53,8 @@ def force_curve(
     fit : Fit
     etfe : Etfe
         Of a recording with random excitation.
-    over : {"velocity", "load velocity", "position", "stretch", "command", "damping along the way"}
+    over : str
+        One of the variables of `bayeshaptic.effects.nonlinear.shapes`.
     motion : ndarray, shape (N,)
         As `motions` gives it.
     times : ndarray, shape (N,), or float

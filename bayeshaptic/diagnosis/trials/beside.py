@@ -21,11 +21,19 @@ from bayeshaptic.effects.laws import BESIDE
 from bayeshaptic.effects.library import effects
 from bayeshaptic.effects.nonlinear.internal_force import CONNECTION, LOAD, MOTOR
 from bayeshaptic.effects.nonlinear.protocol import CommandEffect
-from bayeshaptic.effects.nonlinear.shapes import ALONG, LOAD_VELOCITY, POSITION, STRETCH, VELOCITY
+from bayeshaptic.effects.nonlinear.shapes import (
+    ALONG,
+    LOAD_VELOCITY,
+    POSITION,
+    STRETCH,
+    STRETCH_VELOCITY,
+    VELOCITY,
+)
 
 _OVER = {  # by the first of a law's variables, and its place
     (VELOCITY, MOTOR): VELOCITY,
     (VELOCITY, LOAD): LOAD_VELOCITY,
+    (VELOCITY, CONNECTION): STRETCH_VELOCITY,
     (POSITION, MOTOR): POSITION,
     (ALONG, MOTOR): ALONG,
     (POSITION, CONNECTION): STRETCH,

@@ -21,7 +21,13 @@ from bayeshaptic.diagnosis.widening.deviation import Deviation, deviation, evide
 from bayeshaptic.diagnosis.widening.forces_left import forces_left
 from bayeshaptic.diagnosis.widening.friction import with_friction_for_damping
 from bayeshaptic.effects.laws import variables
-from bayeshaptic.effects.nonlinear.shapes import ALONG, EXCESS_NOISE, LOAD_VELOCITY, VELOCITY
+from bayeshaptic.effects.nonlinear.shapes import (
+    ALONG,
+    EXCESS_NOISE,
+    LOAD_VELOCITY,
+    STRETCH_VELOCITY,
+    VELOCITY,
+)
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.inference.posterior import Posterior
 from bayeshaptic.stability.binding import as_known, binding_kinds, group_crossings
@@ -184,6 +190,9 @@ def _downwards(traced: Traced, family: str) -> float:
         if trial.accepted.family == family
     ]
     raised = {test.name for test in traced.after if test.flagged}
+    if STRETCH_VELOCITY in variables(raised):
+        less = with_friction_for_damping(fit, dampers=("bc",))
+        others.append(critical_stiffness(fit.model, less).value)
     if {VELOCITY, LOAD_VELOCITY, ALONG} & variables(raised):
         others.append(critical_stiffness(fit.model, with_friction_for_damping(fit)).value)
     elif family == "nonlinear" and EXCESS_NOISE in raised:

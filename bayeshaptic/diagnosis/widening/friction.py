@@ -8,6 +8,8 @@ would make this noise may be friction.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from bayeshaptic.diagnosis.residuals.excess import changing_share
@@ -38,7 +40,9 @@ def may_be_held_by_friction(fit: Fit, traced: Traced) -> bool:
     return left == {EXCESS_NOISE} and changing_share(fit, traced.state.etfe) > _HELD_BY_FRICTION
 
 
-def with_friction_for_damping(fit: Fit, etfe: Etfe | None = None) -> Floats:
+def with_friction_for_damping(
+    fit: Fit, etfe: Etfe | None = None, dampers: Collection[str] = GROUND_DAMPERS
+) -> Floats:
     """The fitted parameters, shape (P,), with only that part of the damping that must be viscous.
 
     Parameters
@@ -46,8 +50,10 @@ def with_friction_for_damping(fit: Fit, etfe: Etfe | None = None) -> Floats:
     fit : Fit
     etfe : Etfe, optional
         By whose noise friction is bounded; without one most of the damping may be friction.
+    dampers : collection of str
+        Which may be friction: those to the ground, or the connection's.
     """
-    damped = np.array([name in GROUND_DAMPERS for name in fit.model.names])
+    damped = np.array([name in dampers for name in fit.model.names])
     least = _VISCOUS
     if etfe is not None:
         least = max(least, 1.0 - _as_damper(fit, etfe) / max(fit.theta[damped].sum(), 1e-300))

@@ -14,6 +14,7 @@ from bayeshaptic.effects.nonlinear.shapes import (
     LOAD_VELOCITY,
     POSITION,
     STRETCH,
+    STRETCH_VELOCITY,
     VELOCITY,
     Shape,
     Usual,
@@ -22,6 +23,8 @@ from bayeshaptic.effects.registry import register
 from bayeshaptic.effects.typical import device_mass
 from bayeshaptic.models import Model
 
+# What friction between two masses looks like: of a hysteresis, a spring that softens.
+_IN_CONNECTION = {STRETCH_VELOCITY, STRETCH}
 FAINT_TO_STRONG = np.array([0.003, 0.01, 0.03, 0.1, 0.3])  # over the force scale
 
 
@@ -38,6 +41,12 @@ def _against(v: Floats) -> Floats:
     return -np.sign(v)
 
 
+def _everywhere(motion: Mapping[Place, Motion]) -> dict[Place, float]:
+    """The same, and where masses may rub against each other."""
+    places = (MOTOR, LOAD, CONNECTION)
+    return {p: float(motion[p].velocity.std()) for p in places if p in motion}
+
+
 def bodies(motion: Mapping[Place, Motion]) -> dict[Place, float]:
     """Where something may rub against the ground, and the rms velocity there."""
     return {p: float(motion[p].velocity.std()) for p in (MOTOR, LOAD) if p in motion}
@@ -50,7 +59,16 @@ class _DryFriction(NonlinearEffect):
     sticks = True
 
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
-        return force_scale(model, theta, motion) * FAINT_TO_STRONG
+        scale = force_scale(model, theta, motion)
+        if self.place == CONNECTION:  # what it hides as is the connection's own damper
+            damper = float(theta[model.names.index("bc")])
+            scale = max(scale, 3 * damper * float(motion.velocity.std()))
+        return scale * FAINT_TO_STRONG
+
+    def called_for(self, raised: set[str]) -> bool:
+        if self.place == CONNECTION:
+            return bool(raised & _IN_CONNECTION)
+        return super().called_for(raised)
 
 
 @register
@@ -62,6 +80,7 @@ class CoulombFriction(_DryFriction):
     tests = (
         Shape("sign(v)", "a force like sign(v), as dry friction", VELOCITY, _against),
         Shape("sign(v2)", "dry friction at the load", LOAD_VELOCITY, _against),
+        Shape("sign(v - v2)", "dry friction in the connection", STRETCH_VELOCITY, _against),
     )
     # Where it holds the mass most of the time, all that is left of it is noise.
     over = (VELOCITY, LOAD_VELOCITY, EXCESS_NOISE)
@@ -70,7 +89,7 @@ class CoulombFriction(_DryFriction):
     def candidates(
         cls, model: Model, motion: Mapping[Place, Motion]
     ) -> tuple[NonlinearEffect, ...]:
-        return tuple(map(cls, bodies(motion)))
+        return tuple(map(cls, _everywhere(motion)))
 
     @classmethod
     def shapes(cls, place: Place, usual: Usual) -> tuple[Shape, ...]:
@@ -224,7 +243,7 @@ class DahlFriction(_DryFriction):
         rate = 2 * np.pi * 10.0  # rad/s; the way of the motion is its velocity over that
         return tuple(
             cls(place, {"presliding_distance": share * usual / rate})
-            for place, usual in bodies(motion).items()
+            for place, usual in _everywhere(motion).items()
             for share in (0.1, 0.3, 1.0, 3.0)
         )
 

@@ -16,6 +16,7 @@ from bayeshaptic.types import Floats
 
 VELOCITY, POSITION, STRETCH, COMMAND = "velocity", "position", "stretch", "command"
 LOAD_VELOCITY = "load velocity"
+STRETCH_VELOCITY = "stretch velocity"  # of the motor relative to the load
 ALONG = "damping along the way"  # a function of the position, times the velocity
 EXCESS_NOISE = "excess noise"  # a test that is of no shape
 
@@ -32,8 +33,8 @@ class Shape:
         In words; "{where}" stands for the place.
     over : str
         The variable: "velocity" or "position" of the motor, "load velocity", "stretch" of the
-        connection, or "command"; or "damping along the way", where `force` takes the motor's
-        position and its result is multiplied by the velocity.
+        connection or "stretch velocity", or "command"; or "damping along the way", where `force`
+        takes the motor's position and its result is multiplied by the velocity.
     force : callable
         From the variable to the force on the mass, shapes (N,).
     dimension : str

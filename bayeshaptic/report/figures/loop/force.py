@@ -24,6 +24,7 @@ _TITLES = {
     "load velocity": "velocity of\nthe load",
     "position": "position",
     "stretch": "stretch",
+    "stretch velocity": "velocity of\nthe stretch",
     "command": "command",
     "damping along the way": "at the usual speed:\nposition",
 }
@@ -71,7 +72,7 @@ def draw(closed: Closed) -> Figure:
 def _curves(closed: Closed) -> dict[str, list[tuple[ForceCurve, dict[str, Any]]]]:
     from bayeshaptic.diagnosis.residuals.columns import motions
     from bayeshaptic.diagnosis.residuals.force_curve import force_curve
-    from bayeshaptic.effects.nonlinear.shapes import ALONG, COMMAND, VELOCITY
+    from bayeshaptic.effects.nonlinear.shapes import ALONG, COMMAND, STRETCH_VELOCITY, VELOCITY
 
     base, analysis = closed.base, closed.analysis
     assert base.recording is not None
@@ -84,7 +85,7 @@ def _curves(closed: Closed) -> dict[str, list[tuple[ForceCurve, dict[str, Any]]]
     for over, motion in known.items():
         if over == COMMAND and over not in _raised(closed.traced.after):
             continue  # only where it is still in question
-        if over == ALONG and over not in _raised(closed.traced.before):
+        if over in (ALONG, STRETCH_VELOCITY) and over not in _raised(closed.traced.before):
             continue
         times = known[VELOCITY] / known[VELOCITY].std() if over == ALONG else 1.0
         row = [(force_curve(base.fit, base.etfe, over, motion, times), _BEFORE)]
