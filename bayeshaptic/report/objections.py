@@ -13,7 +13,7 @@ from bayeshaptic.diagnosis.residuals.columns import SPEED, SPENT
 from bayeshaptic.diagnosis.residuals.ripples import GAIN
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.effects.laws import variables
-from bayeshaptic.effects.nonlinear.shapes import ALONG, LOAD_VELOCITY, STRETCH_VELOCITY, VELOCITY
+from bayeshaptic.effects.nonlinear.shapes import ALONG, LOAD_VELOCITY, VELOCITY
 from bayeshaptic.quantities import percent, pure, quantity
 from bayeshaptic.recordings.checks.loop_period import doubts_of_the_loop, rows_are_uneven
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
@@ -297,4 +297,4 @@ def _rubs_otherwise(closed: Closed) -> bool:
     direct = closed.analysis.etfe.direct
     if acts and closed.force is None and not (direct or closed.model.held):
         left |= {test.name for test in closed.traced.after if test.noticed}
-    return bool(variables(left) & {VELOCITY, LOAD_VELOCITY, STRETCH_VELOCITY, ALONG})
+    return bool(variables(left) & {VELOCITY, LOAD_VELOCITY, ALONG})
