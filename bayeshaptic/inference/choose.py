@@ -9,19 +9,20 @@ device counts as one mass in a hand.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from bayeshaptic.arguments import at_the_door
 from bayeshaptic.devices import Device
-from bayeshaptic.inference.criterion import deviance, information_criterion
+from bayeshaptic.inference.criterion import ScoredFit, deviance, information_criterion
 from bayeshaptic.inference.fit import MISFIT, Fit
-from bayeshaptic.inference.least_squares import SETS, least_squares
+from bayeshaptic.inference.least_squares import SETS, continued, least_squares
 from bayeshaptic.inference.loop_response import fitted_to_the_loop
 from bayeshaptic.models import Prior, build_model
 from bayeshaptic.models.build import with_force_sensor
+from bayeshaptic.models.chains import as_three_masses, as_two_masses
 from bayeshaptic.models.prior_table import refuse_unknown
 from bayeshaptic.models.structures import GRASPED, ONE_IN_A_HAND
 from bayeshaptic.quantities import pure
@@ -41,38 +42,6 @@ _WORDS = {
     "grasped": "a device held by a user",
 }
 CANDIDATES = tuple(_WORDS)
-
-
-@dataclass(frozen=True)
-class ScoredFit:
-    """A base model that was tried.
-
-    Attributes
-    ----------
-    fit : Fit
-    score : float
-        Bayesian information criterion, with the residual of the best candidate as the noise where
-        that exceeds the noise (a quasi-likelihood); smaller is better.
-    from_a_hand : float
-        Squared distance of its hand from what hands are like, in standard deviations, where both
-        this and the misfit are least: a chi-square of five numbers, and in the score; zero where
-        there is no hand.
-    etfe : Etfe or None
-        What it was fitted to: of some measurements each model makes its own.
-    as_one_mass : bool
-        Whether it is a grasped device that scores as one mass in a hand.
-    """
-
-    fit: Fit
-    score: float
-    from_a_hand: float = 0.0
-    etfe: Etfe | None = field(default=None, repr=False)
-    as_one_mass: bool = False
-
-    @property
-    def held(self) -> bool:
-        """Whether somebody holds it."""
-        return self.fit.model.held
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -190,9 +159,14 @@ def choose_model(
 
     names = {None: ("rigid", "free", "grasped"), True: ("grasped",), False: ("rigid", "free")}
     for name in names[held]:
-        # Where a simpler one leaves noise, no deeper valley of a richer one would be chosen.
-        noise_reached = any(fit.reduced_chi_square < _NOISE for fit in fits.values())
-        fit_to(name, most_sets=1 if noise_reached else SETS)
+        # Where a simpler one leaves noise, no deeper valley of a richer one would be chosen.  The
+        # direct method takes what a fit leaves for the noise, and of held devices one set of
+        # starting points often ends short of the deepest (see `likeliest`).
+        reached = any(fit.reduced_chi_square < _NOISE for fit in fits.values())
+        many = not reached or (etfe.direct and name == GRASPED.name)
+        fit_to(name, most_sets=SETS if many else 1)
+    if held is None and etfe.direct:
+        fits["free"] = _with_the_hand_for_a_mass(fits["free"], fits["grasped"], etfes["free"])
     one_mass = ONE_IN_A_HAND.name
     if held is None and device is None and _may_be_one_mass(fits):
         fit_to(one_mass, most_sets=1)
@@ -237,11 +211,22 @@ def _may_be_one_mass(fits: Mapping[str, Fit]) -> bool:
 
 def _from_the_hand(chain: Fit, grasped: Fit, etfe: Etfe) -> Fit:
     """The better fit of the chain: as it is, or begun with the hand for a third mass."""
-    values = dict(zip(grasped.model.names, grasped.theta, strict=True))
-    values |= {"m3": values["mh"], "c3": values["bs"], "k3": values["ks"], "b3": values["bh"]}
-    start = np.array([values[name] for name in chain.model.names])
+    start = as_three_masses(grasped.model, grasped.theta, chain.model)
     other = least_squares(chain.model, etfe, start=start)
     return min(chain, other, key=lambda fit: fit.reduced_chi_square)
+
+
+def _with_the_hand_for_a_mass(free: Fit, grasped: Fit, etfe: Etfe) -> Fit:
+    """The likelier fit of two masses: as it is, or begun with what was found for three.
+
+    In closed loop no fit says that it misfits: all sets of starting points may end in a valley that
+    is far below one that a hand leads to.
+    """
+    if grasped.log_likelihood < free.log_likelihood + UNDECIDED:
+        return free
+    starts = as_two_masses(grasped.model, grasped.theta, free.model)
+    found = (continued(replace(free, theta=theta, alike=theta[None]), etfe) for theta in starts)
+    return max(free, *found, key=lambda fit: fit.log_likelihood)
 
 
 def _best(candidates: Mapping[str, ScoredFit], noise: float) -> str:

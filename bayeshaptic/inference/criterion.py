@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
 from bayeshaptic.inference.fit import Fit, search_box, weighted_residuals
 from bayeshaptic.models.hand import from_a_hand
 from bayeshaptic.numerics.gauss_newton import minimise
+from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.types import Floats
 
 # Differences of BIC, or of twice the log likelihood: evidence "not worth more than a bare mention",
@@ -68,3 +71,35 @@ def deviance(fit: Fit, noise: float) -> tuple[float, float]:
     steps, settled = 40, 1e-3  # of the least sum of misfit and distance from a hand
     phi, half = minimise(both, start, low, high, steps, settled)
     return own + 2 * float(half[0]) - at_fit, float(np.sum(hand(phi) ** 2))
+
+
+@dataclass(frozen=True)
+class ScoredFit:
+    """A base model that was tried.
+
+    Attributes
+    ----------
+    fit : Fit
+    score : float
+        Bayesian information criterion, with the residual of the best candidate as the noise where
+        that exceeds the noise (a quasi-likelihood); smaller is better.
+    from_a_hand : float
+        Squared distance of its hand from what hands are like, in standard deviations, where both
+        this and the misfit are least: a chi-square of five numbers, and in the score; zero where
+        there is no hand.
+    etfe : Etfe or None
+        What it was fitted to: of some measurements each model makes its own.
+    as_one_mass : bool
+        Whether it is a grasped device that scores as one mass in a hand.
+    """
+
+    fit: Fit
+    score: float
+    from_a_hand: float = 0.0
+    etfe: Etfe | None = field(default=None, repr=False)
+    as_one_mass: bool = False
+
+    @property
+    def held(self) -> bool:
+        """Whether somebody holds it."""
+        return self.fit.model.held

@@ -161,3 +161,28 @@ def _named(
     for n, (spring, damper) in enumerate(zip(springs[1:], dampers[1:], strict=True), start=3):
         named |= {f"k{n}": spring, f"c{n}": damper}
     return named
+
+
+def as_two_masses(grasped: Model, theta: Floats, free: Model) -> Floats:
+    """Vectors of `free` that move as a held device may at `theta`, where nobody holds that.
+
+    The hand is left out, moves as one with the load, or is the load itself, on a motor of two
+    masses that move as one.
+
+    Returns
+    -------
+    ndarray, shape (3, P)
+    """
+    alone = dict(zip(grasped.names, theta, strict=True))
+    load = {"m2": alone["m2"] + alone["mh"], "b2": alone["b2"] + alone["bh"]}
+    motor = {"m1": alone["m1"] + alone["m2"], "b1": alone["b1"] + alone["b2"]}
+    hand = {"bc": alone["bs"], "kc": alone["ks"], "m2": alone["mh"], "b2": alone["bh"]}
+    ways = alone, alone | load, alone | motor | hand
+    return np.array([[way[name] for name in free.names] for way in ways])
+
+
+def as_three_masses(grasped: Model, theta: Floats, chain: Model) -> Floats:
+    """The vector of a chain whose third mass is the hand of a held device at `theta`, (P,)."""
+    values = dict(zip(grasped.names, theta, strict=True))
+    values |= {"m3": values["mh"], "c3": values["bs"], "k3": values["ks"], "b3": values["bh"]}
+    return np.array([values[name] for name in chain.names])

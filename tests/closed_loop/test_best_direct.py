@@ -16,7 +16,8 @@ from bayeshaptic.diagnosis.state import Accepted, State, Trial
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Traced
 from bayeshaptic.diagnosis.trials import direct
 from bayeshaptic.diagnosis.trials.direct import trace_directly
-from bayeshaptic.inference.choose import UNDECIDED, Choice, ScoredFit
+from bayeshaptic.inference.choose import UNDECIDED, Choice
+from bayeshaptic.inference.criterion import ScoredFit
 from bayeshaptic.numerics.spending import Meter
 from benchmarks.through_reference import make
 

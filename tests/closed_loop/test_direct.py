@@ -9,13 +9,15 @@ from scipy.signal import lfilter
 
 from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.residuals.causal import scores
-from bayeshaptic.inference.least_squares import least_squares, likeliest
-from bayeshaptic.models import grasped
+from bayeshaptic.inference.choose import _with_the_hand_for_a_mass, choose_model
+from bayeshaptic.inference.least_squares import SETS, least_squares, likeliest
+from bayeshaptic.models import free, grasped
 from bayeshaptic.models.start import informed
 from bayeshaptic.recordings.from_arrays import recording_from_arrays
 from bayeshaptic.recordings.response.estimate import estimate_by_direct_method
 from bayeshaptic.report.headline import headline
 from bayeshaptic.rig import Bench, run_loop
+from bayeshaptic.stability.critical import critical_stiffness
 
 
 def loop(seed, held=False, friction=0.0, seconds=8.0, lacking=None, known=False, device="phantom"):
@@ -166,3 +168,34 @@ def test_in_a_loop_sets_of_starting_points_follow_until_three_agree(monkeypatch)
     monkeypatch.setattr(module, "_fit", lambda *_: next(ends))
     assert likeliest(wrong, etfe).theta == pytest.approx(right.theta)
     assert next(ends) is pytest.fail  # no set after the third that agrees
+
+
+def test_a_held_device_begins_from_several_sets_in_a_loop(monkeypatch):
+    """Simpler models always seem to leave noise: that is no reason to look less far for a hand."""
+    _, _, recording = loop(3)
+    module, asked = importlib.import_module("bayeshaptic.inference.choose"), {}
+
+    def one_set(model, etfe, seed, start, shorter, most_sets):
+        asked[model.name] = most_sets
+        return least_squares(model, etfe, most_sets=1)
+
+    monkeypatch.setattr(module, "least_squares", one_set)
+    choose_model(estimate_by_direct_method(recording))
+    assert asked["grasped"] == SETS
+
+
+def test_two_masses_are_sought_where_a_hand_leads():
+    """Free devices were taken for held ones, at 8 times their limit, where no start led there."""
+    bench, truth, recording = loop(3)
+    etfe = estimate_by_direct_method(recording)
+    right = least_squares(free(period_s=bench.period_s), etfe)
+    model = informed(grasped(period_s=bench.period_s), etfe)
+    values = dict(zip(right.model.names, right.theta, strict=True))
+    of_a_hand = {"mh": 1e-6, "bh": 1e-6, "kh": 1e-6, "bs": 1e-6, "ks": 1e-6}
+    theta = np.array([(values | of_a_hand)[name] for name in model.names])
+    held = replace(least_squares(model, etfe, start=theta), theta=theta)
+    wrong = least_squares(right.model, etfe, start=np.full(right.model.size, 0.5))
+    assert wrong.log_likelihood < right.log_likelihood - 100 < held.log_likelihood
+    found = _with_the_hand_for_a_mass(wrong, held, etfe)
+    assert found.log_likelihood == pytest.approx(right.log_likelihood, abs=0.5)
+    assert critical_stiffness(found.model, found.theta).value == pytest.approx(truth, rel=0.05)

@@ -16,7 +16,8 @@ from bayeshaptic.diagnosis.base.best_base import traced_from_best_base
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED
 from bayeshaptic.inference import choose, criterion
-from bayeshaptic.inference.choose import UNDECIDED, Choice, ScoredFit
+from bayeshaptic.inference.choose import UNDECIDED, Choice
+from bayeshaptic.inference.criterion import ScoredFit
 from bayeshaptic.models.hand import from_a_hand
 from bayeshaptic.numerics.spending import RATE, Meter, spend
 from bayeshaptic.rig import Bench, WhiteNoise, critical_limit, simulate

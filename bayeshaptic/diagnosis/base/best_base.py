@@ -18,8 +18,13 @@ from bayeshaptic.diagnosis.base.begun import Begun, base_of, fitted, refitted
 from bayeshaptic.diagnosis.base.loops_in_turn import LoopsInTurn, parameters_of
 from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.traced import EXPLAINED, UNEXPLAINED, Traced
-from bayeshaptic.inference.choose import Choice, ScoredFit
-from bayeshaptic.inference.criterion import BARE_MENTION, VERY_STRONG, information_criterion
+from bayeshaptic.inference.choose import Choice
+from bayeshaptic.inference.criterion import (
+    BARE_MENTION,
+    VERY_STRONG,
+    ScoredFit,
+    information_criterion,
+)
 from bayeshaptic.inference.fit import MISFIT, Fit
 from bayeshaptic.inference.loop_response import as_of_the_loop, hardly_differ
 from bayeshaptic.models import Model
