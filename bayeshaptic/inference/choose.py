@@ -225,8 +225,9 @@ def _with_the_hand_for_a_mass(free: Fit, grasped: Fit, etfe: Etfe) -> Fit:
     if grasped.log_likelihood < free.log_likelihood + UNDECIDED:
         return free
     starts = as_two_masses(grasped.model, grasped.theta, free.model)
-    found = (continued(replace(free, theta=theta, alike=theta[None]), etfe) for theta in starts)
-    return max(free, *found, key=lambda fit: fit.log_likelihood)
+    begun = (continued(replace(free, theta=theta, alike=theta[None]), etfe) for theta in starts)
+    best = max(begun, key=lambda fit: fit.log_likelihood)
+    return best if best.log_likelihood > free.log_likelihood + UNDECIDED else free
 
 
 def _best(candidates: Mapping[str, ScoredFit], noise: float) -> str:

@@ -199,3 +199,5 @@ def test_two_masses_are_sought_where_a_hand_leads():
     found = _with_the_hand_for_a_mass(wrong, held, etfe)
     assert found.log_likelihood == pytest.approx(right.log_likelihood, abs=0.5)
     assert critical_stiffness(found.model, found.theta).value == pytest.approx(truth, rel=0.05)
+    likelier = replace(held, log_likelihood=right.log_likelihood + 100)
+    assert _with_the_hand_for_a_mass(right, likelier, etfe) is right  # it leads to the same valley
