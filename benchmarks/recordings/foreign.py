@@ -147,6 +147,7 @@ class LoadFriction(Effect):
     """Dry friction on the far mass."""
 
     name: ClassVar[str] = "load_friction"
+    between: ClassVar[tuple[str, str]] = ("m2", FRAME)
     force: float = 0.6
 
     @classmethod
@@ -154,7 +155,15 @@ class LoadFriction(Effect):
         return cls(0.15 * scales.force)
 
     def build(self, structure: Structure) -> None:
-        structure.laws.append(NodeLaw("m2", FRAME, DryFriction(self.force, self.force)))
+        structure.laws.append(NodeLaw(*self.between, DryFriction(self.force, self.force)))
+
+
+@dataclass(frozen=True)
+class Hysteresis(LoadFriction):
+    """Dry friction of the transmission against its own stretching, as of a cable or a gear."""
+
+    name: ClassVar[str] = "hysteresis"
+    between: ClassVar[tuple[str, str]] = ("m1", "m2")
 
 
 @dataclass(frozen=True)

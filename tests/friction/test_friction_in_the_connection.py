@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,27 +20,11 @@ from bayeshaptic.models import build_model
 from bayeshaptic.recordings import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.rig import Bench, WhiteNoise
-from bayeshaptic.rig.dynamics.laws import DryFriction
-from bayeshaptic.rig.dynamics.structure import NodeLaw, Structure
-from bayeshaptic.rig.effects.effect import Effect, MotionScales
+from bayeshaptic.rig.effects.effect import Effect
+from benchmarks.recordings.foreign import Hysteresis
 
 LHIFAM = Bench.from_device("lhifam")
 TEST = "sign(v - v2)"
-
-
-@dataclass(frozen=True)
-class Hysteresis(Effect):
-    """Dry friction of the transmission against its own stretching."""
-
-    name: ClassVar[str] = "hysteresis"
-    force: float = 0.4
-
-    @classmethod
-    def typical(cls, scales: MotionScales) -> Hysteresis:
-        return cls(0.1 * scales.force)
-
-    def build(self, structure: Structure) -> None:
-        structure.laws.append(NodeLaw("m1", "m2", DryFriction(self.force, self.force)))
 
 
 def recorded(*effects: Effect, seed: int = 5) -> Recording:
@@ -55,7 +38,7 @@ def fitted(recording: Recording) -> Fit:
 
 def test_the_residual_shows_it_and_a_clean_device_has_none() -> None:
     scores = []
-    for effects in ((Hysteresis(),), ()):
+    for effects in ((Hysteresis(0.4),), ()):
         recording = recorded(*effects)
         tests = {t.name: t for t in nonlinear_tests(fitted(recording), estimate_etfe(recording))}
         scores.append(tests[TEST].statistic / tests[TEST].threshold)
@@ -89,3 +72,11 @@ def test_of_the_damping_only_the_connections_may_be_friction() -> None:
     changed = with_friction_for_damping(fit, dampers=("bc",)) / fit.theta
     others = [name != "bc" for name in fit.model.names]
     assert changed[others] == pytest.approx(1.0) and changed[np.invert(others)] < 0.5
+
+
+def test_a_damper_of_the_connection_that_is_known_counts_as_well() -> None:
+    motion = SimpleNamespace(velocity=np.linspace(-1.0, 1.0, 5))
+    law, model = CoulombFriction(CONNECTION), build_model("free", "lhifam")
+    known = model.with_known({"bc": model.values[model.names.index("bc")]})
+    strengths = [law.first_strengths(one, one.values, motion) for one in (model, known)]
+    assert "bc" not in known.names and strengths[1] == pytest.approx(strengths[0])

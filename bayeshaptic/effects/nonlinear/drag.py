@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayeshaptic.effects.nonlinear.friction import FAINT_TO_STRONG, bodies, force_scale
+from bayeshaptic.effects.nonlinear.friction import FAINT_TO_STRONG, force_scale, rms_velocities
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR, Law, Place
 from bayeshaptic.effects.nonlinear.protocol import Floats, Motion, NonlinearEffect
 from bayeshaptic.effects.nonlinear.shapes import ALONG, LOAD_VELOCITY, VELOCITY, Shape, Usual
@@ -28,7 +28,7 @@ class _PowerOfVelocity(NonlinearEffect):
     def candidates(
         cls, model: Model, motion: Mapping[Place, Motion]
     ) -> tuple[NonlinearEffect, ...]:
-        return tuple(map(cls, bodies(motion)))
+        return tuple(map(cls, rms_velocities(motion)))
 
     @classmethod
     def shapes(cls, place: Place, usual: Usual) -> tuple[Shape, ...]:

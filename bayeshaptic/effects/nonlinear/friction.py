@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from bayeshaptic.effects.registry import register
 from bayeshaptic.effects.typical import device_mass
 from bayeshaptic.models import Model
 
+# To the ground; and where masses may rub against each other, too.
+_BODIES = (MOTOR, LOAD)
+_EVERYWHERE = (*_BODIES, CONNECTION)
 # What friction between two masses looks like: of a hysteresis, a spring that softens.
 _IN_CONNECTION = {STRETCH_VELOCITY, STRETCH}
 FAINT_TO_STRONG = np.array([0.003, 0.01, 0.03, 0.1, 0.3])  # over the force scale
@@ -41,15 +44,11 @@ def _against(v: Floats) -> Floats:
     return -np.sign(v)
 
 
-def _everywhere(motion: Mapping[Place, Motion]) -> dict[Place, float]:
-    """The same, and where masses may rub against each other."""
-    places = (MOTOR, LOAD, CONNECTION)
+def rms_velocities(
+    motion: Mapping[Place, Motion], places: Iterable[Place] = _BODIES
+) -> dict[Place, float]:
+    """Where something may rub, against the ground by default, and the rms velocity there."""
     return {p: float(motion[p].velocity.std()) for p in places if p in motion}
-
-
-def bodies(motion: Mapping[Place, Motion]) -> dict[Place, float]:
-    """Where something may rub against the ground, and the rms velocity there."""
-    return {p: float(motion[p].velocity.std()) for p in (MOTOR, LOAD) if p in motion}
 
 
 class _DryFriction(NonlinearEffect):
@@ -61,8 +60,9 @@ class _DryFriction(NonlinearEffect):
     def first_strengths(self, model: Model, theta: Floats, motion: Motion) -> Floats:
         scale = force_scale(model, theta, motion)
         if self.place == CONNECTION:  # what it hides as is the connection's own damper
-            damper = float(theta[model.names.index("bc")])
-            scale = max(scale, 3 * damper * float(motion.velocity.std()))
+            values = {**model.fixed, **dict(zip(model.names, theta, strict=True))}
+            hidden = float(values["bc"] * motion.velocity.std())
+            scale = max(scale, 3 * hidden)  # the strongest is nine tenths of it
         return scale * FAINT_TO_STRONG
 
     def called_for(self, raised: set[str]) -> bool:
@@ -89,7 +89,7 @@ class CoulombFriction(_DryFriction):
     def candidates(
         cls, model: Model, motion: Mapping[Place, Motion]
     ) -> tuple[NonlinearEffect, ...]:
-        return tuple(map(cls, _everywhere(motion)))
+        return tuple(map(cls, rms_velocities(motion, _EVERYWHERE)))
 
     @classmethod
     def shapes(cls, place: Place, usual: Usual) -> tuple[Shape, ...]:
@@ -129,7 +129,7 @@ class StribeckFriction(_DryFriction):
     ) -> tuple[NonlinearEffect, ...]:
         return tuple(
             cls(place, {"static_excess": rise, "stribeck_velocity": share * usual})
-            for place, usual in bodies(motion).items()
+            for place, usual in rms_velocities(motion).items()
             for rise in (0.35, 0.8)
             for share in (0.05, 0.25)
         )
@@ -180,7 +180,7 @@ class RisingFriction(_DryFriction):
     ) -> tuple[NonlinearEffect, ...]:
         return tuple(
             cls(place, {"lack_at_rest": 0.7, "rising_velocity": share * usual})
-            for place, usual in bodies(motion).items()
+            for place, usual in rms_velocities(motion).items()
             for share in (0.2, 0.6)
         )
 
@@ -243,7 +243,7 @@ class DahlFriction(_DryFriction):
         rate = 2 * np.pi * 10.0  # rad/s; the way of the motion is its velocity over that
         return tuple(
             cls(place, {"presliding_distance": share * usual / rate})
-            for place, usual in _everywhere(motion).items()
+            for place, usual in rms_velocities(motion, _EVERYWHERE).items()
             for share in (0.1, 0.3, 1.0, 3.0)
         )
 
