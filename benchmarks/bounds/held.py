@@ -2,9 +2,13 @@
 
 What no command explains of the position is the encoder's noise and the motion that a hand makes by
 itself.  Its covariance is taken as known, and whatever the controller is, the innovations of that
-are what is new in a sample (L. Ljung, *System Identification*, 1999, chapter 13).  A posterior has
-to find it, so that its width may be more.  The priors count as in a posterior: nobody knows a hand
-without.  A damper that is zero counts as known: a posterior finds it at the edge of its prior.
+are what is new in a sample (L. Ljung, *System Identification*, 1999, chapter 13).  An encoder's
+rounding is no white noise where the device moves by less than a count a sample: it has the spectrum
+that it had.  A posterior has to find the covariance, so that its width may be more.  Where nothing
+is known of it, what noise made of the command tells nothing (U. Forssell and L. Ljung, Automatica
+35, 1999): that bound takes the command of the same loop without noise.  The priors count as in a
+posterior: nobody knows a hand without.  A damper that is zero counts as known: a posterior finds it
+at the edge of its prior.
 """
 
 from __future__ import annotations
@@ -23,25 +27,31 @@ from bayeshaptic.types import Floats
 _STEP = 1e-4  # of the logarithm of a parameter
 _WIDE = 0.05  # the same for what a prior says
 _SAME = 1e-6  # free motions that differ by less are one
+_SEEN = 30  # over so many lines the spectrum of rounding is taken for smooth
 
 
-def bound_db(recording: Recording, bench: Bench, model: Model) -> float:
+def bound_db(
+    recording: Recording, bench: Bench, model: Model, rounding: Floats | None = None
+) -> float:
     """Least standard deviation of K_CR in dB, the model's parameters and its state unknown.
 
     Parameters
     ----------
     recording : Recording
+        Or one with a command that no noise is in.
     bench : Bench
         Held, without friction.
     model : Model
         `grasped` with its priors, for the response, the names and the limit.
+    rounding : ndarray, shape (N,), optional
+        That of `noise_covariance`.
     """
     truth = np.array([bench.values.get(name, bench.delay_s) for name in model.names])
     ways = np.eye(model.size)[truth > 0]
     up, down = (truth * np.exp(sign * _STEP * ways) for sign in (1, -1))
     driven = (_motions(model, up, recording) - _motions(model, down, recording)) / (2 * _STEP)
     own = _free_motions(model, truth, recording)
-    covariance = noise_covariance(bench, recording.samples)
+    covariance = noise_covariance(bench, recording.samples, rounding)
     slopes = np.concatenate([driven, own]).T
     told = slopes.T @ solve_toeplitz(covariance, slopes)
     count = len(ways)
@@ -53,13 +63,15 @@ def bound_db(recording: Recording, bench: Bench, model: Model) -> float:
     return float(np.sqrt(gradient @ np.linalg.solve(information, gradient)))
 
 
-def noise_covariance(bench: Bench, samples: int) -> Floats:
+def noise_covariance(bench: Bench, samples: int, rounding: Floats | None = None) -> Floats:
     """Of what no command explains of a position: at lags of 0 to N - 1 samples.
 
     Parameters
     ----------
     bench : Bench
     samples : int
+    rounding : ndarray, shape (N,), optional
+        What the encoder added to the position; without, a white noise of the variance of rounding.
     """
     plant = bench.plant()
     grid = _grid(samples)
@@ -74,8 +86,20 @@ def noise_covariance(bench: Bench, samples: int) -> Floats:
         shape = np.asarray(density(frequency_hz))
         spectrum += compliance * rms**2 * shape / shape.mean()
     found = np.asarray(irfft(spectrum, grid)[:samples])
+    if rounding is not None:
+        return found + _autocovariance(rounding)
     found[0] += bench.encoder_resolution**2 / 12 + bench.sensor_noise_rms**2
     return found
+
+
+def _autocovariance(noise: Floats) -> Floats:
+    """At all lags, with the window of Parzen, whose spectrum is nowhere negative."""
+    samples = len(noise)
+    power = np.abs(rfft(noise - noise.mean(), _grid(samples))) ** 2
+    found = irfft(power, _grid(samples))[:samples] / samples
+    lag = np.minimum(_SEEN * np.arange(samples) / samples, 1.0)
+    near, far = 1 - 6 * lag**2 + 6 * lag**3, 2 * (1 - lag) ** 3
+    return np.asarray(found * np.where(lag < 0.5, near, far))
 
 
 def _grid(samples: int) -> int:
