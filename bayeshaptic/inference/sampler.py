@@ -245,7 +245,7 @@ def _message(verdict: Verdict, evaluations: int) -> str:
     if verdict.known:
         return (
             f"Converged because {verdict.facts}. Stopped after {evaluations} evaluations of the "
-            "likelihood, so that a small risk may be known less well than was asked for."
+            "likelihood, so that the limit or a small risk may be known less well than asked for."
         )
     return (
         f"Not converged after {evaluations} evaluations of the likelihood: {verdict.facts}, where "
