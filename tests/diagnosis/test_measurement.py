@@ -346,6 +346,25 @@ def test_sweeps_that_nearly_repeat_are_no_tones(seed: int) -> None:
         assert len(find_tones(recording, band, rigid.response).tones) == tones
 
 
+@pytest.mark.parametrize("hum", [False, True])
+def test_bursts_at_equal_times_through_an_uneven_actuator_are_no_tones(hum: bool) -> None:
+    """What is weaker one way adds the size of the force, which has tones of its own."""
+    rng, held, period_s = np.random.default_rng(9), Device(LHIFAM_HELD), 1e-3
+    time_s = np.arange(12000) * period_s
+    force = rng.normal(size=len(time_s)) * (np.arange(len(time_s)) % 500 < 200)
+    position = held.simulate(force - 0.2 * np.abs(force))
+    position += hum * 3e-6 * np.cos(2 * np.pi * 50.13 * time_s)
+    recording = recording_from_arrays(
+        force=force,
+        position=3e-7 * np.round(position / 3e-7),
+        period_s=period_s,
+        force_unit="N",
+        position_unit="m",
+    )
+    found = find_tones(recording, (0.7, 200.0), estimate_etfe(recording).spectra.reference)
+    assert len(found.tones) == hum
+
+
 @pytest.mark.parametrize("count, force", [(1e-4, True), (1e-4, False), (0.0, True)])
 def test_a_regression_is_that_of_least_squares_whichever_way_it_is_solved(
     count: float, force: bool

@@ -39,13 +39,15 @@ FEWEST_TONES = 5
 # the force ever idle; the position stood still for 9 % at most, of a weak chirp for 23 %.
 MOST_IDLE = 0.33
 _IDLE_S = 0.1
+# Blows, or bursts, with pauses between are an excitation: of how many in a recording at least?
+_BLOWS = 3
 # A standstill lasts for 0.1 s, or for as long as the motion usually takes for so many counts where
 # that is shorter, 20 samples at least: dry friction holds a device at the end of steps of 50 ms. Of
 # 300 open loops under noise, multisines, sweeps and binary sequences none rests for over 22 % so;
 # of 60 under steps five are refused (two with 0.1 s alone), one of them without friction.
 _USUAL_COUNTS = 30.0
 _FEWEST = 20
-# Share of the samples: a recording may begin at zero.
+# Share of the samples with a force.
 _OF_ONE_SIZE = 0.99
 
 TOO_LITTLE = "too little"  # the topic of a warning
@@ -80,8 +82,8 @@ def says_nothing_of_the_actuator(recording: Recording) -> list[Notice]:
     """
     size = np.abs(recording.force - (recording.force.max() + recording.force.min()) / 2)
     near = 1e-6 * size.max()
-    pause = np.abs(recording.force) <= near
-    if np.mean(pause | (size.max() - size <= near)) < _OF_ONE_SIZE:
+    acting = np.abs(recording.force) > near
+    if np.count_nonzero(size[acting] >= size.max() - near) < _OF_ONE_SIZE * max(acting.sum(), 1):
         return []
     text = (
         "The force has two levels, so that what the actuator may keep back of small commands (a "
@@ -165,15 +167,24 @@ def few_tones(recording: Recording) -> TooLittle | None:
     return TooLittle(reason, _USUAL)
 
 
-def _no_force(recording: Recording) -> TooLittle | None:
-    force = recording.force
-    idle = np.zeros(len(force), dtype=bool)
-    for first, stop in zip(*runs(force == 0), strict=True):
+def _idle(recording: Recording) -> Bools:
+    """Which samples are of a rest of the force, shape (N,)."""
+    idle = np.zeros(recording.samples, dtype=bool)
+    for first, stop in zip(*runs(recording.force == 0), strict=True):
         idle[first:stop] = stop - first >= round(_IDLE_S / recording.period_s)
+    return idle
+
+
+def _no_force(recording: Recording) -> TooLittle | None:
+    idle = _idle(recording)
     if np.mean(idle) <= MOST_IDLE:
         return None
     first, stop = longest(~idle)
-    if stop - first < max(FEWEST_SAMPLES, shortest_s(recording.period_s) / recording.period_s):
+    least = max(FEWEST_SAMPLES, round(shortest_s(recording.period_s) / recording.period_s))
+    if stop - first < least:
+        driven = np.flatnonzero(~idle)
+        if np.count_nonzero(np.diff(driven) > 1) >= _BLOWS - 1 and np.ptp(driven) >= least:
+            return None  # what rests in between comes to a standstill, which is asked by itself
         cure = "excite the device all the time, and record again"
     else:
         cure = f"read the longest part with force alone, --rows {first + 1}:{stop}, or record again"
@@ -224,10 +235,13 @@ def _standstill(recording: Recording) -> TooLittle | None:
             "device leans on a stop",
             "widen the range, or keep the device in its middle, and record again",
         )
+    more = "excite it two or three times as strongly"
+    if np.mean(_idle(recording)) > MOST_IDLE:
+        more = "strike it more often, or excite it all the time"
     return TooLittle(
         f"the position stands still for {100 * still:.0f} % of the recording: dry friction holds "
         "the device, or the motion is smaller than a count of the encoder",
-        "excite it two or three times as strongly, so that it keeps moving, and record again",
+        f"{more}, so that it keeps moving, and record again",
     )
 
 
