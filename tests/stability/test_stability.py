@@ -433,3 +433,15 @@ def test_a_pole_that_runs_away_beside_a_far_one_is_no_marginal_one() -> None:
     nothing = np.zeros(3), np.zeros(3, int)
     found = PoleResponse(poles, ones, ones, 0 * ones, poles, *nothing, exact=True)
     assert found.stable_at_rest().tolist() == [True, False, True]
+
+
+def test_a_filter_of_a_microsecond_makes_no_slow_pole_marginal() -> None:
+    """A load of a ton stood for a hand's ground: with any filter one in eight limits was 0."""
+    rates = np.array([5e-5, 1e-5])  # at which the load comes to rest, 1/s
+    mass, load, none = (np.full(2, value) for value in (2.3, 1e3, 0.0))
+    links = (Link(0, 1, np.full(2, 6.0), np.full(2, 360.0)), Link(1, None, load * rates, none))
+    plain = LinearSystem(Mechanism((mass, load), links), np.full(2, 2e-6))
+    filtered = plain.with_filter(np.ones((1, 2)), np.stack([np.ones(2), np.full(2, 1e-6)]))
+    limits = [find_crossings(system, T).critical for system in (plain, filtered)]
+    assert (limits[0] > 1e4).all()
+    assert limits[1] == pytest.approx(limits[0], rel=1e-2)

@@ -132,9 +132,12 @@ class PoleResponse:
         Near a pole z0 on the circle with residue R the closed-loop pole is z0 - K R, so it goes
         inwards where Re(conj(z0) R) > 0.
         """
-        scale = np.abs(self.poles).max(axis=1, keepdims=True)
-        # Beside a pole that a far-away draw puts at 1e13 rates one that runs away is none of these.
-        marginal = np.abs(self.poles.real) <= np.minimum(1e-10 * scale, 1e-6)
+        size = np.abs(self.poles)
+        # Rounding is that of the pole itself, or of those of the mechanism beside it, none of which
+        # matters beyond a radian a sample: a filter of a microsecond, whose pole is at a thousand,
+        # made slow poles marginal that had 1e-7 of damping, and the limit 0.
+        scale = np.maximum(size, np.minimum(size.max(axis=1, keepdims=True), 1.0))
+        marginal = np.abs(self.poles.real) <= 1e-10 * scale
         z0 = np.exp(1j * np.where(marginal, self.poles.imag, 0.0))
         residue = (self.direct + self.late / z0) * z0 ** -self.delay[:, None]
         outwards = (np.conj(z0) * residue).real < 0
