@@ -65,7 +65,12 @@ def _beside(etfe: Etfe, system: LinearSystem) -> Etfe:
 
 
 def hardly_differ(etfe: Etfe, other: Etfe) -> bool:
-    """Whether two estimates from one measurement differ by less than their errors."""
+    """Whether two estimates from one measurement differ by less than their errors.
+
+    Through a reference the band is where that moves the force, which may end elsewhere each time.
+    """
+    if not np.array_equal(etfe.frequency_hz, other.frequency_hz):
+        return False
     apart = np.abs(etfe.value - other.value) ** 2 / etfe.variance
     return bool(np.sum(apart) < _SAME)
 

@@ -134,6 +134,19 @@ def test_a_fit_does_not_run_away_with_what_is_between_the_samples(monkeypatch):
     assert fit is first and etfe == "first"
 
 
+def test_estimates_of_other_windows_differ():
+    """Through a reference the band is where that moves the force, which is seen anew."""
+    frequency, value = np.arange(1.0, 97.0), np.ones(96, complex)
+    etfe = SimpleNamespace(frequency_hz=frequency, value=value, variance=np.full(96, 1.0))
+    fewer = SimpleNamespace(
+        frequency_hz=frequency[:89], value=value[:89], variance=np.full(89, 1.0)
+    )
+    assert loop_response.hardly_differ(etfe, etfe)
+    assert not loop_response.hardly_differ(fewer, etfe)
+    shifted = SimpleNamespace(frequency_hz=1.01 * frequency, value=value, variance=etfe.variance)
+    assert not loop_response.hardly_differ(etfe, shifted)
+
+
 def test_a_delay_that_nobody_told_is_none_of_a_measured_force():
     unknown = bh.free(period_s=PERIOD_S)
     assert with_force_sensor(unknown).fixed["delay_s"] == 0.0
