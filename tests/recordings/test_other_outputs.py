@@ -275,6 +275,22 @@ def test_differences_of_an_encoder_are_told_from_a_tachometer(output, tmp_path):
         assert np.allclose(told.position, count * np.round(position / count))
 
 
+@pytest.mark.parametrize("output", ["tachometer", "differences"])
+def test_noise_is_looked_at_where_there_is_no_force_too(output, tmp_path):
+    """A multisine to 150 Hz leaves no power at the fast lines: every tachometer was refused."""
+    rng = np.random.default_rng(6)
+    tones = np.where(np.arange(1001) < 300, np.exp(2j * np.pi * rng.uniform(size=1001)), 0.0)
+    force = np.tile(np.fft.irfft(tones), 5)
+    keep = np.exp(-3e-3)
+    speed = lfilter([0.0, (1 - keep) / 3], [1.0, -keep], force)
+    count = 1e-3 * np.std(np.cumsum(speed)) * PERIOD_S
+    position = count * np.round(np.cumsum(speed) * PERIOD_S / count)
+    noise = 1e-2 * np.std(speed) * rng.standard_normal(len(speed))
+    seen = {"tachometer": speed + noise, "differences": np.diff(position, prepend=0.0) / PERIOD_S}
+    told = with_differences(tacho(tmp_path / "speed.npz", force, seen[output]))
+    assert (told.sensed is None) == (output == "differences")
+
+
 def gains_of_one_mass(mass, damping, delay_s):
     """The velocity's filter from a held command, [0, 1 - late, late - keep] / b over 1 - keep/z."""
     keep = np.exp(-damping / mass * PERIOD_S)

@@ -16,7 +16,7 @@ import numpy as np
 
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.recording import Recording
-from bayeshaptic.recordings.response.estimators.random_excitation import estimate_random
+from bayeshaptic.recordings.response.estimators.random_excitation import windows_of_all
 
 # Angles w T between which the noise is compared.
 _SLOW, _LOWER, _MIDDLE, _FAST = (0.05, 0.1), (0.2, 0.6), (0.3, 0.6), (1.3, 2.0)
@@ -75,8 +75,7 @@ class _Noise(NamedTuple):
 
 def _noise(recording: Recording) -> _Noise:
     assert recording.sensed is not None
-    whole = (1 / recording.duration_s, 0.49 / recording.period_s)
-    windows = estimate_random(recording, whole, None)[0].windows()
+    windows = windows_of_all(recording)
     theta = 2 * np.pi * recording.period_s * windows.frequency_hz[:, 1]
     freedom = windows.lines - 3
     power = windows.scatter / freedom * recording.sensed.noise(theta)

@@ -99,6 +99,19 @@ def estimate_direct(recording: Recording) -> tuple[DirectSpectra, Points]:
     return spectra, points(spectra.windows())
 
 
+def windows_of_all(recording: Recording) -> Windows:
+    """Windows of all lines but the last ones, also where the force has no power: noise alone there.
+
+    Parameters
+    ----------
+    recording : Recording
+        In one piece.
+    """
+    whole = (1 / recording.duration_s, 0.49 / recording.period_s)
+    lines = Lines.of(recording).cut(whole, default_minimum_lines(recording.duration_s))
+    return _with_reference(lines)[1]
+
+
 def points(windows: Windows) -> Points:
     """Response, variance and coherence at the centre of each window.
 
