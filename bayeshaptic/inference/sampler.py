@@ -97,7 +97,8 @@ def sample(
         Called with the share done and a word about it; True draws a bar.
     most_evaluations : int
         Evaluations of the likelihood after which to give up, a cap that is the same on every
-        machine; the result then says it has not converged.
+        machine; the result then says it has not converged. Chains that lack less than half of what
+        is asked for go on for as many again.
     rule : callable, optional
         What to ask for instead of `ess`: judges chains of natural values, shape (ensembles, S,
         walkers, P), and returns a `bayeshaptic.inference.sampling.stopping.Verdict`.
@@ -197,7 +198,7 @@ def _run(
     verdict = run_until_done(
         run,
         lambda phi: settings.rule(here.natural(phi)),
-        lambda: settings.most_evaluations - counted.count,
+        lambda times: int(times * settings.most_evaluations) - counted.count,
         report,
         keep,
     )

@@ -18,6 +18,8 @@ from bayeshaptic.types import Floats, LogDensity, Progress
 
 _FIRST_STEPS = 32  # before chains are looked at for the first time
 _MIXED = 0.06  # effective draws a draw, an autocorrelation of 16 steps: below, a proposal is refit
+# Share of the draws asked for from which on as many evaluations again are forecast to be enough.
+_NEARLY = 0.5
 
 
 @dataclass
@@ -137,11 +139,14 @@ class Run:
 def run_until_done(
     run: Run,
     rule: Rule,
-    left: Callable[[], int],
+    left: Callable[[float], int],
     report: Progress,
     keep: Callable[[Run], None],
 ) -> Verdict:
     """Advance all ensembles until they are done, or no evaluations are `left`.
+
+    Chains that lack little by then go on for as many evaluations again: what was spent on them
+    would be lost, and with it the limit, for want of a few steps.
 
     Parameters
     ----------
@@ -150,7 +155,7 @@ def run_until_done(
     rule : callable
         Judges chains in sampling coordinates.
     left : callable
-        Evaluations that may still be spent.
+        Evaluations that may still be spent, where so many times the usual may be in all.
     report : callable
     keep : callable
         Called with the run before its chains are looked at.
@@ -166,7 +171,8 @@ def run_until_done(
         advance()
     while True:
         verdict = rule(run.chains)
-        affordable = left() // (ENSEMBLES * WALKERS * run.every)
+        nearly = not verdict.known and verdict.share >= _NEARLY
+        affordable = left(1 / _NEARLY if nearly else 1.0) // (ENSEMBLES * WALKERS * run.every)
         if verdict.done or affordable < _FIRST_STEPS:
             return verdict
         run.go_on(verdict, affordable)

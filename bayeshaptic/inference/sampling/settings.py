@@ -28,7 +28,8 @@ class SamplerSettings:
         Folder in which a sampler that runs for long keeps its state, to go on after an
         interruption.
     most_evaluations : int
-        Evaluations of the likelihood after which to give up, the same on every machine.
+        Evaluations of the likelihood after which to give up, the same on every machine; twice as
+        many where little is lacking.
     """
 
     rule: Rule
