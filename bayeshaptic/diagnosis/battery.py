@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.causal import causal_tests
-from bayeshaptic.diagnosis.residuals.columns import speed_tests
 from bayeshaptic.diagnosis.residuals.drift import drift_tests
 from bayeshaptic.diagnosis.residuals.excess import excess_noise_test
 from bayeshaptic.diagnosis.residuals.periods import change_tests
@@ -16,6 +15,7 @@ from bayeshaptic.diagnosis.residuals.residual import (
     smooth_columns,
 )
 from bayeshaptic.diagnosis.residuals.ripples import ripple_tests
+from bayeshaptic.diagnosis.residuals.supply import speed_tests
 from bayeshaptic.diagnosis.samples.mend import SampleLook, measurement_tests
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.recordings.response.etfe import Etfe

@@ -15,7 +15,7 @@ from bayeshaptic.diagnosis.feedback.tones_in_motion import tones_of
 from bayeshaptic.diagnosis.feedback.units_in_loop import with_units_of
 from bayeshaptic.diagnosis.limit_known import LimitKnown, asked_of_sampler
 from bayeshaptic.diagnosis.options import Options
-from bayeshaptic.diagnosis.residuals.columns import SPENT, speed_tests
+from bayeshaptic.diagnosis.residuals.supply import SPENT, speed_tests
 from bayeshaptic.diagnosis.samples.sinusoids import in_words
 from bayeshaptic.diagnosis.state import Accepted, Estimate
 from bayeshaptic.diagnosis.traced import CONSISTENT, EXPLAINED, UNEXPLAINED, Traced

@@ -9,8 +9,8 @@ import numpy as np
 
 from bayeshaptic.diagnosis.base.alignment import LATER, LESS, LESS_DELAY, MOVED
 from bayeshaptic.diagnosis.base.high_passed import TOPIC as HIGH_PASSED
-from bayeshaptic.diagnosis.residuals.columns import SPEED, SPENT
 from bayeshaptic.diagnosis.residuals.ripples import GAIN
+from bayeshaptic.diagnosis.residuals.supply import LIMIT, SPEED, SPENT
 from bayeshaptic.diagnosis.result import Result
 from bayeshaptic.effects.laws import variables
 from bayeshaptic.effects.nonlinear.shapes import ALONG, LOAD_VELOCITY, VELOCITY
@@ -51,6 +51,7 @@ _NO_LAW = {
     GAIN.test: "the gain of the actuator ripples along the way, which was not taken off, and where "
     "it is largest the limit is lower by that",
     SPEED: SPENT,
+    LIMIT: SPENT,
 }
 _LAGS = {"extra_delay", "position_filter", "actuator_lag"}
 

@@ -9,7 +9,7 @@ import pytest
 
 from bayeshaptic.diagnosis.close_loop import close_loop
 from bayeshaptic.diagnosis.feedback.lacking import with_laws
-from bayeshaptic.diagnosis.residuals.columns import SPENT, speed_tests
+from bayeshaptic.diagnosis.residuals.supply import LIMIT, SPENT, speed_tests
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.recordings import Recording, recording_from_arrays
@@ -84,6 +84,22 @@ def test_no_stiffness_where_damping_may_be_what_the_actuator_does_not_give(
     said = headline(closed)
     assert said.stiffness is None
     assert "the faster it moves" in said.sentence
+
+
+@pytest.mark.parametrize("lost", [0.0, 10.0])
+def test_a_limit_that_falls_with_the_speed_is_seen_where_noise_seldom_reaches_it(
+    lost: float,
+) -> None:
+    """Saturation was named, and what the speed does to it passed for damping, in green."""
+    force = np.random.default_rng(6).normal(0.0, 0.55 * LEVEL, int(SECONDS / PERIOD_S))
+    recording = moved(lambda row, _: float(force[row]), lost, len(force), COUNT)
+    closed = close_loop(recording, model="rigid", delay_s=0.0, hidden=False)
+    assert "actuator_saturation" in [effect.name for effect in closed.effects]
+    (test,) = (test for test in closed.traced.after if test.name == LIMIT)
+    assert test.flagged == (lost > 0)
+    said = headline(closed)
+    assert (said.stiffness is None) == (lost > 0)
+    assert ("the faster it moves" in said.sentence) == (lost > 0)
 
 
 @pytest.mark.parametrize("lost", [0.0, 30.0])

@@ -15,9 +15,10 @@ from browser import needs_browser, probe
 from fake_analysis import FakeAnalysis, fake_analysis, fake_closed
 
 from bayeshaptic import read_recording, write_report
-from bayeshaptic.diagnosis.residuals.columns import SPEED, motions
+from bayeshaptic.diagnosis.residuals.columns import motions
 from bayeshaptic.diagnosis.residuals.force_curve import force_curve
 from bayeshaptic.diagnosis.residuals.ripples import WAVES
+from bayeshaptic.diagnosis.residuals.supply import SPEED
 from bayeshaptic.diagnosis.state import Accepted
 from bayeshaptic.diagnosis.traced import Candidate
 from bayeshaptic.effects.library import effect_class

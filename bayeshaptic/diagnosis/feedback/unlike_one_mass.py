@@ -9,7 +9,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bayeshaptic.diagnosis.residuals.columns import ROUNDING, SPENT
+from bayeshaptic.diagnosis.residuals.columns import ROUNDING
+from bayeshaptic.diagnosis.residuals.supply import SPENT
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.types import Floats
 

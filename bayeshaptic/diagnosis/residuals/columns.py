@@ -31,7 +31,6 @@ from bayeshaptic.effects.nonlinear.shapes import (
 from bayeshaptic.inference.fit import Fit
 from bayeshaptic.models.response.filters import share
 from bayeshaptic.numerics.polynomials.polynomial import Polynomial, evaluate
-from bayeshaptic.quantities import percent
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.windows import Windows, remembered
@@ -43,12 +42,6 @@ ROUNDING = 1e-6
 # Share of an instrument that its input has at least: less says nothing of how strong a force is.
 # It bounds a strength's standard deviation, and no score, so it raises no alarm.
 WEAK = 0.05
-SPEED = "u |v|"  # the test for a gain that goes with the speed
-SPENT = (
-    "the actuator gives another share of the command the faster it moves, and what the model takes "
-    "for damping may be that"
-)
-"""What is said where that test is flagged."""
 
 
 def nonlinear_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
@@ -78,36 +71,6 @@ def force_test(name: str, score: float, seen: ForceSeen) -> Test:
         what = f"a force like {shape.title}"
     text = f"{what} stands {score:.1f} standard deviations out of the noise"
     return Test(name, "nonlinear", score, thresholds.two_sided(), None, text, seen)
-
-
-def speed_tests(fit: Fit, etfe: Etfe) -> tuple[Test, ...]:
-    """Does the actuator give less of the command, or more, the faster it moves?
-
-    A supply whose voltage is used up gives less of a force along the motion, which a linear model
-    takes for damping.  That is no function of the command alone, nor of the motion alone.
-
-    Parameters
-    ----------
-    fit : Fit
-    etfe : Etfe
-        Of a recording in open loop; of one in pieces, or that repeats, nothing is asked.
-    """
-    recording = etfe.unbroken
-    if recording is None or etfe.period_lines is not None:
-        return ()
-    at_lines = Lines.of(etfe, recording)
-    speed = np.abs(driven_velocity(fit, recording))
-    force = recording.force - recording.force.mean()
-    usual = float(np.sqrt(np.mean(speed**2)))
-    added = response_to(fit, COMMAND, at_lines.s) * at_lines(force * speed / usual)
-    windows = etfe.spectra.windows(remembered(fit.response), added[None])
-    share, sd, freedom = common_coefficient(windows)
-    score = as_normal(abs(share / sd), freedom) if sd > 0 else 0.0
-    text = (
-        f"a gain that is {percent(abs(share))} {'less' if share < 0 else 'more'} at the usual "
-        f"speed than at rest stands {score:.1f} standard deviations out of the noise"
-    )
-    return (Test(SPEED, "nonlinear", score, thresholds.two_sided(), None, text),)
 
 
 def common_coefficient(windows: Windows, inputs: int = 1) -> tuple[float, float, float]:

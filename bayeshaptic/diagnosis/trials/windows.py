@@ -9,6 +9,7 @@ import numpy as np
 from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.battery import model_tests, residual_tests
 from bayeshaptic.diagnosis.residuals.residual import Test
+from bayeshaptic.diagnosis.residuals.supply import limit_tests
 from bayeshaptic.diagnosis.samples.mend import SampleLook, look_at_samples, repair_measurement
 from bayeshaptic.diagnosis.state import Change, State, Trial, fit_part, log_likelihoods
 from bayeshaptic.diagnosis.trials.beside import beside_tests
@@ -53,9 +54,10 @@ class WindowTrials:
 
     def tests(self, state: State) -> tuple[Test, ...]:
         """The tests of its residual; samples that were mended are not looked at again."""
+        limit = limit_tests(state.fit, state.etfe, state.accepted)
         if _is_mended(state):
-            return model_tests(state.fit, state.etfe)
-        return residual_tests(state.fit, state.etfe, self._look)
+            return (*model_tests(state.fit, state.etfe), *limit)
+        return (*residual_tests(state.fit, state.etfe, self._look), *limit)
 
     def mended(self, state: State) -> State:
         """With what is wrong with the samples mended; the very same where nothing is.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bayeshaptic.diagnosis.residuals.columns import SPEED
 from bayeshaptic.diagnosis.residuals.ripples import WAVES
+from bayeshaptic.diagnosis.residuals.supply import LIMIT, SPEED
 from bayeshaptic.effects.laws import tested
 from bayeshaptic.effects.library import effects
 
@@ -19,6 +19,7 @@ _TESTS = {
     "a steady change": "a steady change during the recording",
     "a change and back": "a change during the recording, and back",
     SPEED: "a command that gives less at speed, like u |v|",
+    LIMIT: "a limit of the actuator that is lower at speed",
     **{wave.test: wave.title for wave in WAVES},
 }
 
