@@ -39,8 +39,6 @@ FEWEST_TONES = 5
 # the force ever idle; the position stood still for 9 % at most, of a weak chirp for 23 %.
 MOST_IDLE = 0.33
 _IDLE_S = 0.1
-# Blows, or bursts, with pauses between are an excitation: of how many in a recording at least?
-_BLOWS = 3
 # A standstill lasts for 0.1 s, or for as long as the motion usually takes for so many counts where
 # that is shorter, 20 samples at least: dry friction holds a device at the end of steps of 50 ms. Of
 # 300 open loops under noise, multisines, sweeps and binary sequences none rests for over 22 % so;
@@ -167,28 +165,22 @@ def few_tones(recording: Recording) -> TooLittle | None:
     return TooLittle(reason, _USUAL)
 
 
-def _idle(recording: Recording) -> Bools:
-    """Which samples are of a rest of the force, shape (N,)."""
-    idle = np.zeros(recording.samples, dtype=bool)
-    for first, stop in zip(*runs(recording.force == 0), strict=True):
-        idle[first:stop] = stop - first >= round(_IDLE_S / recording.period_s)
-    return idle
-
-
 def _no_force(recording: Recording) -> TooLittle | None:
-    idle = _idle(recording)
+    force = recording.force
+    idle = np.zeros(len(force), dtype=bool)
+    for first, stop in zip(*runs(force == 0), strict=True):
+        idle[first:stop] = stop - first >= round(_IDLE_S / recording.period_s)
     if np.mean(idle) <= MOST_IDLE:
         return None
+    reason = f"the force is zero for {100 * np.mean(idle):.0f} % of the recording"
     first, stop = longest(~idle)
-    least = max(FEWEST_SAMPLES, round(shortest_s(recording.period_s) / recording.period_s))
-    if stop - first < least:
-        driven = np.flatnonzero(~idle)
-        if np.count_nonzero(np.diff(driven) > 1) >= _BLOWS - 1 and np.ptp(driven) >= least:
-            return None  # what rests in between comes to a standstill, which is asked by itself
-        cure = "excite the device all the time, and record again"
-    else:
+    if stop - first >= max(FEWEST_SAMPLES, shortest_s(recording.period_s) / recording.period_s):
         cure = f"read the longest part with force alone, --rows {first + 1}:{stop}, or record again"
-    return TooLittle(f"the force is zero for {100 * np.mean(idle):.0f} % of the recording", cure)
+        return TooLittle(reason, cure)
+    return TooLittle(
+        f"{reason}, and where a device coasts between blows dry friction passes for damping",
+        "excite the device all the time, and record again",
+    )
 
 
 def share_at_rest(recording: Recording) -> float:
@@ -235,13 +227,10 @@ def _standstill(recording: Recording) -> TooLittle | None:
             "device leans on a stop",
             "widen the range, or keep the device in its middle, and record again",
         )
-    more = "excite it two or three times as strongly"
-    if np.mean(_idle(recording)) > MOST_IDLE:
-        more = "strike it more often, or excite it all the time"
     return TooLittle(
         f"the position stands still for {100 * still:.0f} % of the recording: dry friction holds "
         "the device, or the motion is smaller than a count of the encoder",
-        f"{more}, so that it keeps moving, and record again",
+        "excite it two or three times as strongly, so that it keeps moving, and record again",
     )
 
 
