@@ -61,8 +61,8 @@ class Case:
     def without_noise(self) -> Recording:
         """The same loop with a hand that keeps still and an encoder without counts."""
         still = replace(self.bench, wander_rms=0.0, tremor_rms=0.0, encoder_resolution=0.0)
-        still, seconds = replace(still, sensor_noise_rms=0.0), len(self.law.wanted)
-        made = run_loop(still, self.law.begin(), seconds * still.period_s)
+        still = replace(still, sensor_noise_rms=0.0)
+        made = run_loop(still, self.law.begin(), len(self.law.wanted) * still.period_s)
         return written_down(made.force, made.position, still, "at the sample")
 
 

@@ -80,13 +80,13 @@ class LimitKnown:
         rhat = max([_rhat(limit, chains), *found.rhat[data]])
         error, worth = _worst(limit, QUANTILES)
         risky = self._risks(limit, chains)
-        rough = rhat < RHAT_LIMIT and share >= 1 and (worth >= 1 or error < RISK_PRECISION)
+        known = rhat < RHAT_LIMIT and share >= 1 and (worth >= 1 or error < RISK_PRECISION)
         facts = (
             f"every reported quantile of the critical stiffness is known to {100 * error:.1f} % of "
             "its 90 % interval, R-hat between the independent ensembles is at most "
             f"{rhat:.4f} (of the critical stiffness and of what the data know)"
         )
-        return self._verdict(found, rough, min(share, worth), risky, facts)
+        return self._verdict(found, known, min(share, worth), risky, facts)
 
     def limit_of(self, posterior: Any) -> CriticalStiffness:
         """The limit over all draws of `posterior`, whose chains were watched."""

@@ -50,8 +50,7 @@ _CHANGES = 0.25
 _NO_LAW = {
     GAIN.test: "the gain of the actuator ripples along the way, which was not taken off, and where "
     "it is largest the limit is lower by that",
-    SPEED: SPENT,
-    LIMIT: SPENT,
+    **dict.fromkeys((SPEED, LIMIT), SPENT),
 }
 _LAGS = {"extra_delay", "position_filter", "actuator_lag"}
 

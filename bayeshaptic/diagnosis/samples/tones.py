@@ -32,7 +32,8 @@ _ROUNDING = 1e-9
 # nearly repeat have tones in 27 of 40 without this rule, and in none with it; a hum is seen in 39
 # of 40 without it, and in 25 with it.  Noise reaches it at a line in a million.  The same of the
 # force's size: where bursts come at equal times an actuator that is weaker one way makes tones of
-# them, which hid it (1.05 and 1.14 times the limit).
+# them, which hid it (1.05 and 1.14 times the limit). Of 40 hums under other such sweeps 31 are seen
+# so, 35 without, and all of 40 under noise.
 _PEAK = 20.0
 
 
