@@ -218,8 +218,9 @@ class Loop:
         found, tests = acceptance.with_ties(chosen, open_), remaining(chosen)
         better = self._kind.reconsidered(found, self.meter)
         lighter = self._kind.without_needless(better, self.meter)
-        if lighter is not found:
-            found, tests = lighter, self._remaining(lighter)
+        settled = self._kind.told_apart(lighter, self.meter)
+        if settled is not found:
+            found, tests = settled, self._remaining(settled)
         self._note_taken_out(found)
         self._accept(found, tests)
         return True

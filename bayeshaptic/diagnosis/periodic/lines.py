@@ -35,6 +35,7 @@ from bayeshaptic.diagnosis.state import (
     share,
 )
 from bayeshaptic.diagnosis.trials.linear import accepted_with, sieve
+from bayeshaptic.diagnosis.trials.told_apart import told_apart
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.nonlinear.internal_force import Place
 from bayeshaptic.inference.fit import Fit
@@ -98,22 +99,7 @@ class LineTrials:
     ) -> list[Trial]:
         """All candidates, the best variant of each: a test does not tell their classes apart."""
         assert isinstance(state, BalancedState)
-        found: dict[tuple[str, Place | None], Trial] = {}
-        rest = self._rest(state.part).part(self.fitted)
-        bases = starting_bases(state.part.model, state.part.theta, state.fit.elsewhere)
-        sieved = sieve(state.part.model, self.etfe, rest, bases)
-        best = 0.0
-        for one in sieved:
-            near = one.gain >= thresholds.REACH * sieved[0].gain
-            if not (near and meter.affords(one.effect.title)):
-                continue
-            meter.trying(one.effect.title)
-            with suppress(np.linalg.LinAlgError):  # a motion that runs away has no balance
-                tried = self._with_linear(state.part, one.effect, one.starts, rest)
-                best = max(best, self._gained(state.part, tried))
-                size = len(one.effect.parameters)
-                trial = self._judged(state, tried, size, accepted_with(one.effect))
-                self._keep(found, (one.effect.name, None), trial)
+        best, found = self._linear_trials(state, meter)
         for basis in self._promising(state.part, best):
             if meter.affords(basis.title):
                 meter.trying(basis.title)
@@ -145,9 +131,39 @@ class LineTrials:
                 continue
             loss = full - self._log_likelihoods(tried)[1]
             if needless(loss, len(effect.parameters) or 1) and loss < least:
-                left = state.accepted[:index] + state.accepted[index + 1 :]
-                worst, least = self._state(tried, left), loss
+                worst, least = self._state(tried, _others(state.accepted, index)), loss
         return worst
+
+    def told_apart(self, state: State, meter: Meter) -> State:
+        """With linear effects that tied before the last one was known decided beside it."""
+
+        def trials(bare: State) -> list[Trial]:
+            assert isinstance(bare, BalancedState)
+            return list(self._linear_trials(bare, meter)[1].values())
+
+        return told_apart(state, self._undone, trials)
+
+    def _linear_trials(
+        self, state: BalancedState, meter: Meter
+    ) -> tuple[float, dict[tuple[str, Place | None], Trial]]:
+        """The best gain of a linear effect, and the best variant of each."""
+        found: dict[tuple[str, Place | None], Trial] = {}
+        rest = self._rest(state.part).part(self.fitted)
+        bases = starting_bases(state.part.model, state.part.theta, state.fit.elsewhere)
+        sieved = sieve(state.part.model, self.etfe, rest, bases)
+        best = 0.0
+        for one in sieved:
+            near = one.gain >= thresholds.REACH * sieved[0].gain
+            if not (near and meter.affords(one.effect.title)):
+                continue
+            meter.trying(one.effect.title)
+            with suppress(np.linalg.LinAlgError):  # a motion that runs away has no balance
+                tried = self._with_linear(state.part, one.effect, one.starts, rest)
+                best = max(best, self._gained(state.part, tried))
+                size = len(one.effect.parameters)
+                trial = self._judged(state, tried, size, accepted_with(one.effect))
+                self._keep(found, (one.effect.name, None), trial)
+        return best, found
 
     @staticmethod
     def _keep(found: dict[Any, Trial], key: Any, trial: Trial | None) -> None:
@@ -223,6 +239,14 @@ class LineTrials:
         forces = tuple(basis for basis, stays in zip(part.forces, own, strict=True) if stays)
         return self._balance(part.model, forces, part.theta, part.strength[own])
 
+    def _undone(self, state: State, index: int) -> State | None:
+        """The state without the accepted effect of an index; None where nothing holds then."""
+        assert isinstance(state, BalancedState)
+        with suppress(np.linalg.LinAlgError):
+            if (tried := self._without(state.part, state.accepted[index])) is not None:
+                return self._state(tried, _others(state.accepted, index))
+        return None
+
     def _rest(self, balanced: Balanced) -> Windows:
         """The lines without what internal forces add."""
         return replace(self.windows, target=self.windows.target - balanced.added[:, None])
@@ -243,3 +267,7 @@ class LineTrials:
         corrected = replace(self.etfe, spectra=own, value=value)
         fit = least_squares(whole.model, corrected, start=whole.theta)
         return BalancedState(corrected, fit, sized(accepted, whole), part=part, whole=whole)
+
+
+def _others(accepted: tuple[Accepted, ...], index: int) -> tuple[Accepted, ...]:
+    return accepted[:index] + accepted[index + 1 :]

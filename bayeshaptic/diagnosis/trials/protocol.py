@@ -38,3 +38,6 @@ class Trials(Protocol):
 
     def without_needless(self, state: State, meter: Meter) -> State:
         """Without the earlier effect that a later one made needless, or the very same."""
+
+    def told_apart(self, state: State, meter: Meter) -> State:
+        """With linear effects that tied before the last one was known decided beside it."""

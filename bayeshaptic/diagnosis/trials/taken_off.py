@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from bayeshaptic.diagnosis.state import Accepted, Change
+from bayeshaptic.diagnosis.state import Accepted, Change, State
+from bayeshaptic.inference.fit import summarise
+from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.spectra import RandomSpectra
 from bayeshaptic.types import Floats
@@ -40,3 +42,24 @@ def put_back(etfe: Etfe, change: Change, rest: Sequence[Accepted]) -> Etfe:
     assert isinstance(spectra, RandomSpectra)
     louder = spectra.louder if any(one.acts for one in rest) else None
     return with_forces(etfe, (change,), louder=louder)
+
+
+def undone(state: State, index: int) -> State:
+    """The state without the accepted effect of an index, which has a change to undo."""
+    bare = left_bare(state, index)
+    return replace(bare, fit=least_squares(bare.model, bare.etfe, start=bare.fit.theta))
+
+
+def left_bare(state: State, index: int) -> State:
+    """The state without the accepted effect of an index, and everything else where it is."""
+    change = state.accepted[index].change
+    assert change is not None
+    left = state.accepted[:index] + state.accepted[index + 1 :]
+    model, etfe, theta = state.model, state.etfe, state.fit.theta
+    if change.effect is not None:
+        gone = {parameter.name for parameter in change.effect.parameters}
+        theta = theta[[name not in gone for name in model.names]]
+        model = model.without_effect(change.effect)
+    else:
+        etfe = put_back(etfe, change, left)
+    return State(etfe, summarise(model, state.fit.windows, theta), left)

@@ -11,16 +11,16 @@ from bayeshaptic.diagnosis.battery import model_tests, residual_tests
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.residuals.supply import limit_tests
 from bayeshaptic.diagnosis.samples.mend import SampleLook, look_at_samples, repair_measurement
-from bayeshaptic.diagnosis.state import Change, State, Trial, fit_part, log_likelihoods
+from bayeshaptic.diagnosis.state import State, Trial, fit_part, log_likelihoods
 from bayeshaptic.diagnosis.trials.beside import beside_tests
 from bayeshaptic.diagnosis.trials.drift import drift_trials
 from bayeshaptic.diagnosis.trials.linear import Sight, first_sight, linear_trials
 from bayeshaptic.diagnosis.trials.nonlinear import nonlinear_trials
 from bayeshaptic.diagnosis.trials.other_laws import found_anew, reconsidered
 from bayeshaptic.diagnosis.trials.ripples import ripple_trials
-from bayeshaptic.diagnosis.trials.taken_off import put_back
+from bayeshaptic.diagnosis.trials.taken_off import left_bare, undone
+from bayeshaptic.diagnosis.trials.told_apart import told_apart
 from bayeshaptic.effects.nonlinear.shapes import EXCESS_NOISE
-from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.numerics.spending import Meter
 from bayeshaptic.recordings.response.etfe import compress
 
@@ -132,7 +132,7 @@ class WindowTrials:
         for index, effect in enumerate(state.accepted[:-1]):
             if effect.change is None:
                 continue
-            other = _undone(state, index, effect.change)
+            other = undone(state, index)
             size = len(effect.parameters) + len(effect.estimates)
             worth = full - _held_out(other) - thresholds.A_PARAMETER * size
             if worth < spare:
@@ -142,6 +142,14 @@ class WindowTrials:
             if _held_out(anew) > max(full - thresholds.ENOUGH, _held_out(without)):
                 return anew
         return without if spare < 0 else state
+
+    def told_apart(self, state: State, meter: Meter) -> State:
+        """With linear effects that tied before the last one was known decided beside it."""
+
+        def trials(bare: State) -> list[Trial]:
+            return linear_trials(bare, meter, patient=False)
+
+        return told_apart(state, left_bare, trials)
 
 
 def _raised(tests: tuple[Test, ...], family: str) -> set[str]:
@@ -173,19 +181,6 @@ def _on_other_samples(trial: Trial) -> Trial:
         for effect in trial.state.accepted
     )
     return replace(trial, state=replace(trial.state, accepted=linear))
-
-
-def _undone(state: State, index: int, change: Change) -> State:
-    """The state without an effect."""
-    model, etfe, theta = state.model, state.etfe, state.fit.theta
-    left = state.accepted[:index] + state.accepted[index + 1 :]
-    if change.effect is not None:
-        gone = {parameter.name for parameter in change.effect.parameters}
-        theta = theta[[name not in gone for name in model.names]]
-        model = model.without_effect(change.effect)
-    else:
-        etfe = put_back(etfe, change, left)
-    return State(etfe, least_squares(model, etfe, start=theta), left)
 
 
 def _held_out(state: State) -> float:
