@@ -22,6 +22,7 @@ from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.shown import Shown, data_frame, listed
 from bayeshaptic.types import Complexes, Floats
 
+_CLEAR_SDS = 2.0  # beyond which a number is clearly above zero
 CONVERGED, AT_BOUND, PRIOR_DOMINATED = "converged", "at a bound", "prior-dominated"
 MISFIT = 1.3  # reduced chi-square of a model that lacks something; clean recordings stay below 1.1
 SAME_PERIOD = 1e-3  # relative: time stamps are rounded
@@ -83,8 +84,7 @@ class Fit(Shown):
 
         It scatters by one over the root of the number of points.
         """
-        chance_sds = 4.0
-        return 1.0 + chance_sds / math.sqrt(max(len(self.residual), 1))
+        return 1.0 + 4.0 / math.sqrt(max(len(self.residual), 1))  # four standard deviations
 
     @property
     def misfits(self) -> bool:
@@ -105,8 +105,17 @@ class Fit(Shown):
 
     @property
     def run_away(self) -> bool:
-        """Whether a mass has run away to a bound: see `runs_away`."""
-        return runs_away(self.impossible)
+        """Whether a mass has run away to a bound (see `runs_away`), or could as well."""
+        return runs_away(self.impossible or self.as_ground)
+
+    @property
+    def as_ground(self) -> tuple[str, ...]:
+        """The heaviest mass where it may as well be the ground: one over it may well be zero."""
+        masses = [n for n in self.model.names if self.model.parameter(n).dimension == "mass"]
+        at = max(map(self.model.names.index, masses), key=lambda i: self.theta[i])
+        clear = self.theta[at] > _CLEAR_SDS * self.sd[at]  # as of one over it; nan at a bound
+        hand_or_one = self.model.held or len(masses) < 2  # a hand is more than its mass
+        return () if hand_or_one or clear else (self.model.names[at],)
 
     @property
     def sd(self) -> Floats:
@@ -285,8 +294,6 @@ def _outcomes(model: Model, theta: Floats, sd: Floats, bound: NDArray[np.bool_])
     for i, name in enumerate(model.names):
         prior = model.prior(name)
         spread = 0.5 * float(prior.quantile(0.84) - prior.quantile(0.16))
-        if bound[i]:
-            outcome[name] = AT_BOUND
-        else:
-            outcome[name] = PRIOR_DOMINATED if sd[i] > spread else CONVERGED
+        known = PRIOR_DOMINATED if sd[i] > spread else CONVERGED
+        outcome[name] = AT_BOUND if bound[i] else known
     return outcome

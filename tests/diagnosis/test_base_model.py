@@ -395,20 +395,33 @@ def test_a_third_mass_is_no_hand(tmp_path) -> None:
     assert grasped.score > choice.candidates["chain-2"].score + UNDECIDED
 
 
-def test_one_mass_on_a_spring_is_a_joystick_and_no_second_mass_that_is_the_ground() -> None:
+@pytest.mark.parametrize("told", [{"delay_s": 1e-3, "held": False}, {}], ids=["told", "unknown"])
+def test_one_mass_on_a_spring_is_a_joystick_with_no_second_mass_and_no_hand(told) -> None:
+    """Its second mass would be the ground; and one mass in a hand explains it as well."""
     inertia, spring = 8e-4, 8e-4 * (2 * np.pi * 3) ** 2
     joystick = Bench(
         "rigid", {"m": inertia, "b": 3e-3}, 1e-3, 1e-3, "Nm", encoder_resolution=2 * np.pi / 16384
     ).with_effect("centring_stiffness", stiffness=spring)
     run = simulate(joystick, WhiteNoise(0.3, 300.0, 0.3, 10.0), seed=3)
     recording = bh.recording_from_arrays(**run.signals)
-    found = bh.close_loop(recording, delay_s=1e-3, held=False)
+    found = bh.close_loop(recording, **told)
+    assert found.analysis.posterior.converged
     assert found.analysis.model.name == "rigid"
     assert found.effect_names == ("centring_stiffness",)
     low, median, high = np.log(found.analysis.limit.quantile(np.array([0.05, 0.5, 0.95])))
     off = median - np.log(critical_limit(joystick).stiffness)
     assert abs(off) < 1.5 * (high - low)  # five standard deviations
     assert high - low < 0.05
+
+
+def test_a_second_mass_that_may_as_well_be_the_ground_is_left_out() -> None:
+    """It fits, with tons; and among them is a device that hardly anything but a wall holds."""
+    stick = Bench("rigid", {"m": 0.2, "b": 3.7}, 1e-3, 5e-4, "N", encoder_resolution=1e-3)
+    stick = stick.with_effect("centring_stiffness", stiffness=565.0)
+    run = simulate(stick, WhiteNoise(25.0, 60.0, 0.3, 5.0), seed=1)
+    found = bh.close_loop(bh.recording_from_arrays(**run.signals), hidden=False)
+    assert found.analysis.model.name == "rigid"
+    assert found.effect_names == ("centring_stiffness",)
 
 
 def test_one_mass_in_a_hand_is_a_held_device(tmp_path) -> None:

@@ -20,7 +20,7 @@ from bayeshaptic.numerics.truncated_normal import draw_above, moments_above
 from bayeshaptic.recordings import Recording
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.recordings.response.etfe import compress
-from bayeshaptic.rig import Bench, simulate
+from bayeshaptic.rig import Bench, WhiteNoise, simulate
 from benchmarks.strangers.any_device import make as any_device
 
 fitting = sys.modules[least_squares.__module__]
@@ -29,7 +29,10 @@ CASES = [("lhifam", False), ("phantom", True)]
 
 def measure(bench: Bench, seed: int, seconds: float = 30.0):
     noise = usual_noise(bench, seconds)
-    run = simulate(bench, noise, seed=seed)
+    return as_recorded(simulate(bench, noise, seed=seed))
+
+
+def as_recorded(run):
     recording = Recording(run.force, run.position, run.period_s, run.force_unit, run.position_unit)
     return estimate_etfe(recording)
 
@@ -120,6 +123,19 @@ def test_what_the_data_do_not_decide_is_said():
     fit = least_squares(model, measure(bench, 3, 10.0))
     assert fit.outcome["bc"] in ("prior-dominated", "at a bound")
     assert fit.outcome["m1"] == "converged"
+
+
+def test_a_mass_behind_a_spring_to_the_ground_may_as_well_be_the_ground(unknown):
+    stick = Bench("rigid", {"m": 0.2, "b": 3.7}, 1e-3, 5e-4, "N", encoder_resolution=1e-3)
+    stick = stick.with_effect("centring_stiffness", stiffness=565.0)
+    noise = WhiteNoise(25.0, 60.0, 0.3, 5.0)
+    fits = [least_squares(free(), as_recorded(simulate(stick, noise, seed))) for seed in range(3)]
+    assert [fit.as_ground for fit in fits] == [("m2",)] * 3
+    # One over it is not clearly above zero, at whatever tons the search for it ends.
+    assert "at a bound" not in {fit.outcome["m2"] for fit in fits[1:]}
+    assert all(fit.run_away for fit in fits)
+    *_, (fit, _) = unknown
+    assert not fit.as_ground and not fit.run_away
 
 
 def test_a_model_that_lacks_something_says_so_in_its_chi_square():

@@ -149,10 +149,15 @@ def _rivals(begun: Begun) -> tuple[str, ...]:
 
 
 def _simpler(begun: Begun, fit: Fit) -> tuple[str, ...]:
-    """The base models without a mass that has run away in a fit, as on a spring to the ground."""
-    fewer = {"free": ("rigid",), "chain-2": ("rigid", "free")}
-    known = () if begun.choice is None else begun.choice.candidates
-    return tuple(n for n in fewer.get(fit.model.name, ()) if fit.run_away and n in known)
+    """The base models without a mass that has run away in a fit, as on a spring to the ground.
+
+    And one mass without a hand, where it is one mass that a hand explains: a spring may as well.
+    """
+    name, known = fit.model.name, {} if begun.choice is None else begun.choice.candidates
+    fewer = {"free": ("rigid",), "chain-2": ("rigid", "free")}.get(name, ()) if fit.run_away else ()
+    if name in known and known[name].as_one_mass:
+        fewer = ("rigid",)
+    return tuple(n for n in fewer if n in known)
 
 
 def _best_other(choice: Choice, chosen: ScoredFit) -> tuple[str, ...]:
