@@ -12,7 +12,7 @@ from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.residuals.columns import nonlinear_tests
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.diagnosis.trials.forces.fit import fit_force
-from bayeshaptic.diagnosis.trials.forces.in_doubt import in_doubt
+from bayeshaptic.diagnosis.trials.forces.trial import in_doubt
 from bayeshaptic.diagnosis.trials.forces.tryout import Point, Tryout
 from bayeshaptic.effects.nonlinear.friction import CoulombFriction
 from bayeshaptic.effects.nonlinear.internal_force import MOTOR

@@ -212,9 +212,10 @@ def _not_looked_for(recording: Recording | None, notices: tuple[Notice, ...]) ->
     if has_feedback(notices) or told_too_little(notices):
         return ()
     text = (
-        "In several pieces taken as one neither drift nor faults of samples are looked for, and "
-        "dry friction (or any other force that is not linear) is not taken off where it is seen, "
-        "and makes the limit too high: report on the longest piece by itself, too."
+        "In several pieces taken as one neither drift nor faults of samples are looked for. Dry "
+        "friction (or any other force that is not linear) is taken off where nobody holds the "
+        "device, none of an actuator, and none of what somebody holds, where it makes the limit "
+        "too high: report on the longest piece by itself, too."
     )
     return (Notice("warning", "pieces", text),)
 

@@ -27,7 +27,9 @@ class Lines:
 
     @classmethod
     def of(cls, etfe: Etfe, recording: Recording) -> Lines:
-        """Those of the spectra of a recording in one piece."""
+        """Those of the spectra of a recording; of several pieces one after the other."""
+        if etfe.parts:
+            return cls._of_parts(etfe)
         frequency_hz: Floats = etfe.spectra.frequency_hz  # type: ignore[attr-defined]
         number = np.rint(frequency_hz * (recording.samples * recording.period_s)).astype(int)
 
@@ -35,6 +37,19 @@ class Lines:
             return np.fft.rfft(signal - signal.mean())[number] / np.sqrt(recording.samples)
 
         return cls(frequency_hz, transform)
+
+    @classmethod
+    def _of_parts(cls, etfe: Etfe) -> Lines:
+        """Of each piece that counts, one after the other, of a signal of all samples."""
+        spans = etfe.spans
+        each = [cls.of(part, part.recording) for part in etfe.parts if part.recording]
+
+        def transform(signal: Floats) -> Complexes:
+            return np.concatenate(
+                [one(signal[span]) for one, span in zip(each, spans, strict=True)]
+            )
+
+        return cls(np.concatenate([one.frequency_hz for one in each]), transform)
 
     @property
     def s(self) -> Complexes:

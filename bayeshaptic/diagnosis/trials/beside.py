@@ -16,6 +16,7 @@ from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.diagnosis.state import State
 from bayeshaptic.diagnosis.trials.forces.called_for import is_there
 from bayeshaptic.diagnosis.trials.forces.hints import hints
+from bayeshaptic.diagnosis.trials.forces.in_pieces import simulated_in
 from bayeshaptic.diagnosis.trials.forces.tryout import Tryout
 from bayeshaptic.effects.laws import BESIDE
 from bayeshaptic.effects.library import effects
@@ -46,7 +47,7 @@ def beside_tests(state: State) -> tuple[Test, ...]:
 
     Of the laws that tests look for, at all their places; not of what is there already.
     """
-    recording = state.etfe.unbroken
+    recording = simulated_in(state)
     if recording is None or state.etfe.through_reference or is_periodic(state.etfe):
         return ()
     tryout = Tryout(state, recording)

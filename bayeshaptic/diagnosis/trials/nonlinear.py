@@ -12,6 +12,7 @@ from bayeshaptic.diagnosis import thresholds
 from bayeshaptic.diagnosis.battery import is_periodic
 from bayeshaptic.diagnosis.state import State, Trial
 from bayeshaptic.diagnosis.trials.forces.called_for import called_for
+from bayeshaptic.diagnosis.trials.forces.in_pieces import simulated_in
 from bayeshaptic.diagnosis.trials.forces.search import (
     Variants,
     beside_others,
@@ -46,7 +47,7 @@ def nonlinear_trials(
     meter : Meter
         Says whether one more search for a force, or one more fit of one, is affordable.
     """
-    if state.etfe.unbroken is None or is_periodic(state.etfe):
+    if simulated_in(state) is None or is_periodic(state.etfe):
         return []  # of what repeats, as a mended recording may, the lines have trials of their own
     found = _of_laws(state, raised, meter)
     other = turned(state)
@@ -57,7 +58,7 @@ def nonlinear_trials(
 
 def _of_laws(state: State, raised: set[str], meter: Meter) -> list[Trial]:
     """The trials beside the linear effects of a state as they are."""
-    recording = state.etfe.unbroken
+    recording = simulated_in(state)
     assert recording is not None
     tryout = Tryout(state, recording)
     motion = tryout.simulation.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
@@ -107,9 +108,10 @@ def trial_of(
     meter : Meter
         Says whether that is affordable.
     """
-    if state.etfe.unbroken is None or not meter.affords(kind.title):
+    recording = simulated_in(state)
+    if recording is None or not meter.affords(kind.title):
         return None
-    tryout = Tryout(state, state.etfe.unbroken)
+    tryout = Tryout(state, recording)
     motion = tryout.simulation.motions(state.fit.theta, (MOTOR, LOAD, CONNECTION))
     best = search(tryout, list(kind.candidates(state.model, motion)), motion, meter)
     if not thresholds.convincing(best.gain_fit, best.gain_choose, 1):

@@ -11,6 +11,7 @@ from bayeshaptic.diagnosis import acceptance
 from bayeshaptic.diagnosis.state import Accepted, State, Trial
 from bayeshaptic.diagnosis.trials.forces.called_for import called_for
 from bayeshaptic.diagnosis.trials.forces.hints import departures
+from bayeshaptic.diagnosis.trials.forces.in_pieces import simulated_in
 from bayeshaptic.diagnosis.trials.forces.search import beside_others, fitted, search
 from bayeshaptic.diagnosis.trials.forces.trial import force_trial
 from bayeshaptic.diagnosis.trials.forces.tryout import Tryout
@@ -69,7 +70,7 @@ def reconsidered(state: State, meter: Meter) -> State:
     them.  The very same state is returned where none comes near.
     """
     forces = [one for one in state.accepted if one.change and one.change.acting]
-    for one in forces[:-1] if state.etfe.unbroken else ():
+    for one in forces[:-1] if simulated_in(state) else ():
         if one in state.accepted:
             state = _likeliest(state, _instead_of(one, state, meter))
     return state

@@ -171,7 +171,7 @@ def _joined(
             text = f"Pieces left out, {len(which)} of {len(recording.pieces)} (number {named}): "
             notices[Notice("warning", "pieces", text + f"they {reason}.")] = None
     return replace(
-        _mean_of_longest(parts),
+        mean_of_longest(parts),
         band_hz=band,
         spectra=JoinedSpectra(tuple(part.spectra for part in parts)),
         recording=recording,
@@ -180,8 +180,19 @@ def _joined(
     )
 
 
-def _mean_of_longest(parts: tuple[Etfe, ...]) -> Etfe:
-    """The mean of those that have the frequencies of the longest, weighted by their variances."""
+def mean_of_longest(parts: tuple[Etfe, ...]) -> Etfe:
+    """The mean of those that have the frequencies of the longest, weighted by their variances.
+
+    Parameters
+    ----------
+    parts : tuple of Etfe
+        Of the pieces of a recording.
+
+    Returns
+    -------
+    Etfe
+        That of the longest, with what a person sees of all of them.
+    """
     longest = max(parts, key=lambda part: len(part.frequency_hz))
     alike = [
         part

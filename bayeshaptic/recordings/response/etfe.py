@@ -90,6 +90,15 @@ class Etfe(Shown):
         return None if self.recording is None or self.recording.joints else self.recording
 
     @property
+    def spans(self) -> tuple[slice, ...]:
+        """The samples of the recording that are those of each of the `parts`."""
+        if self.recording is None:
+            return ()
+        each = zip(self.recording.pieces, self.recording.spans, strict=True)
+        known = {piece.name: span for piece, span in each}
+        return tuple(known[part.recording.name] for part in self.parts if part.recording)
+
+    @property
     def through_reference(self) -> bool:
         """Whether it was made in closed loop, and is read through an instrument.
 

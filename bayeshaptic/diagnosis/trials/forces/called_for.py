@@ -16,6 +16,8 @@ def called_for(
     firsts: dict[str, Variants] = {}  # by the name of the strength: laws of friction share one
     others: list[Variants] = []
     for kind in effects("nonlinear"):
+        if state.etfe.parts and issubclass(kind, CommandEffect):
+            continue  # whether an actuator's limit falls with its speed pieces are not asked
         near = [e for e in kind.candidates(state.model, motion) if not is_there(e, state)]
         called = [e for e in near if e.called_for(over)]
         if called and kind.strength[0] in firsts:

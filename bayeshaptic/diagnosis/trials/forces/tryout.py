@@ -18,7 +18,7 @@ import numpy as np
 from bayeshaptic.diagnosis.residuals.lines import Lines
 from bayeshaptic.diagnosis.state import Change, State, fit_part, log_likelihoods
 from bayeshaptic.diagnosis.trials.forces.answer import Answer
-from bayeshaptic.diagnosis.trials.forces.simulation import Simulation
+from bayeshaptic.diagnosis.trials.forces.in_pieces import simulation_in
 from bayeshaptic.diagnosis.trials.taken_off import with_forces
 from bayeshaptic.effects.nonlinear.protocol import Acting, CommandEffect, NonlinearEffect
 from bayeshaptic.inference.least_squares import polish
@@ -103,8 +103,8 @@ class Tryout:
         self.at_lines = Lines.of(state.etfe, recording)
         self._somewhere = state.fit.windows.frequency_hz.mean(axis=1)
         self._base = self._likelihoods(state.fit.theta, state.fit.windows)
-        self.simulation = Simulation(
-            self.model, self.recording, self._usual(), np.zeros(recording.samples) + _motion(there)
+        self.simulation = simulation_in(
+            state, self.recording, self._usual(), np.zeros(recording.samples) + _motion(there)
         )
 
     def _usual(self) -> Floats:

@@ -27,11 +27,30 @@ class JoinedSpectra:
     def lines(self) -> int:
         return sum(part.lines for part in self.parts)
 
+    @property
+    def frequency_hz(self) -> NDArray[Any]:
+        """Of the lines of all parts, one part after the other, shape (L,)."""
+        return np.concatenate([part.frequency_hz for part in self.parts])  # type: ignore[attr-defined]
+
+    @property
+    def louder(self) -> None:
+        """Nobody's hand moves the device further without a force: see `Windows`."""
+        return None
+
+    @property
+    def own_lines(self) -> tuple[slice, ...]:
+        """Which of the lines are those of each part."""
+        edges = np.cumsum([0, *(part.lines for part in self.parts)]).tolist()
+        return tuple(slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True))
+
     def windows(
         self, reference: Reference | None = None, inputs: NDArray[Any] | None = None
     ) -> Windows:
-        """The windows of all parts, one part after the other; without further inputs."""
-        found = [part.windows(reference) for part in self.parts]
+        """The windows of all parts, one part after the other; `inputs` at the lines of all."""
+        found = [
+            part.windows(reference, None if inputs is None else inputs[:, own])
+            for part, own in zip(self.parts, self.own_lines, strict=True)
+        ]
         return Windows(
             *(
                 np.concatenate([getattr(windows, name) for windows in found])
