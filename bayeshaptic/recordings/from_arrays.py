@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,9 @@ from bayeshaptic.arguments import at_the_door
 from bayeshaptic.errors import InputError, Notice, such
 from bayeshaptic.recordings.readers.numbers import as_numbers
 from bayeshaptic.recordings.recording import Recording
+from bayeshaptic.recordings.signals.continued import Rows, Signals, continued
 from bayeshaptic.recordings.signals.raw_signals import increment_unit
+from bayeshaptic.recordings.signals.rows.pauses import Run, runs_on_a_clock
 from bayeshaptic.recordings.signals.rows.repeated import rows_read_once
 from bayeshaptic.recordings.signals.rows.runs import (
     force_held,
@@ -27,11 +29,9 @@ from bayeshaptic.recordings.signals.rows.runs import (
     rows_alike,
     written_each,
 )
-from bayeshaptic.recordings.signals.rows.timing import Timing, sampling_period
 from bayeshaptic.recordings.signals.rows.uneven_rows import uneven_rows
-from bayeshaptic.recordings.signals.turns import unwrapped, without_jumps
 from bayeshaptic.recordings.units import assumed_units, base_unit, choose_units
-from bayeshaptic.types import Floats, Ints
+from bayeshaptic.types import Floats
 
 
 @at_the_door
@@ -95,9 +95,10 @@ def recording_from_arrays(
     )
     count = None if encoder_resolution is None else factor * encoder_resolution
     signals = replace(signals, force=force, position=position)
-    signals, timing, held = _on_a_clock(signals, stamps, period_s, where)
+    signals, runs, said, held = _on_a_clock(signals, stamps, period_s, where)
     units = choose_units(force_unit, position_unit, kind, where)
-    rows = _continued(signals, timing, units[1] == "rad", count, where)
+    rows = continued(signals, runs, units[1] == "rad", count, where)
+    rows = replace(rows, notices=(*said, *rows.notices))
     rows = _a_row_a_period(_without_standstill(rows), held, stamps is not None, period_s)
     return Recording(
         **vars(rows.signals),
@@ -106,34 +107,11 @@ def recording_from_arrays(
         position_unit=units[1],
         name=name,
         encoder_resolution=count,
-        time_jitter=timing.jitter,
+        time_jitter=_jitter(runs),
         source=source,
         notices=rows.notices + assumed_units(force_unit, position_unit, *units),
         joints=rows.joints,
     )
-
-
-@dataclass(frozen=True)
-class _Signals:
-    """What is recorded at each sample; the reference where there is one."""
-
-    force: Floats
-    position: Floats
-    reference: Floats | None
-
-    def __getitem__(self, rows: slice | Ints) -> _Signals:
-        followed = None if self.reference is None else self.reference[rows]
-        return _Signals(self.force[rows], self.position[rows], followed)
-
-
-@dataclass(frozen=True)
-class _Rows:
-    """The signals on an even clock, the rows at which other motions begin, and what to say."""
-
-    signals: _Signals
-    period_s: float
-    joints: tuple[int, ...]
-    notices: tuple[Notice, ...]
 
 
 def _as_given(
@@ -142,9 +120,9 @@ def _as_given(
     reference: ArrayLike | None,
     time: ArrayLike | None,
     where: str,
-) -> tuple[_Signals, Floats | None]:
+) -> tuple[Signals, Floats | None]:
     """The signals and their time stamps as arrays of numbers, all of one length."""
-    signals = _Signals(
+    signals = Signals(
         _signal(force, "force", where),
         _signal(position, "position", where),
         None if reference is None else _signal(reference, "reference", where),
@@ -155,8 +133,8 @@ def _as_given(
 
 
 def _on_a_clock(
-    signals: _Signals, stamps: Floats | None, period_s: float | None, where: str
-) -> tuple[_Signals, Timing, int]:
+    signals: Signals, stamps: Floats | None, period_s: float | None, where: str
+) -> tuple[Signals, tuple[Run, ...], tuple[Notice, ...], int]:
     """The signals, when they were recorded, and for how many of their rows the force is held.
 
     One row for each force, where the period that was said is that of the forces.
@@ -169,30 +147,21 @@ def _on_a_clock(
     each, first = written_each((signals.force,))
     if each > 1 and stamps is not None and _is_period(period_s, stamps, each):
         signals, stamps, held = signals[first::each], stamps[first::each], 1
-    timing = sampling_period(stamps, period_s, where)
-    return signals, replace(timing, notices=(*again, *timing.notices)), held
+    runs, paused = runs_on_a_clock(stamps, len(signals.force), period_s, where)
+    return signals, runs, (*again, *paused), held
 
 
-def _continued(
-    signals: _Signals, timing: Timing, angle: bool, count: float | None, where: str
-) -> _Rows:
-    """Every row of the clock, the position counted on across its jumps."""
-    position, notices = unwrapped(signals.position, angle, count, where)
-    signals = replace(signals, position=position)
-    if timing.rows is not None:
-        from bayeshaptic.recordings.signals.rows.gaps import put_back
-
-        signals = _Signals(*put_back(**vars(signals), rows=timing.rows, where=where))
-    position, joints, jumps = without_jumps(signals.position, signals.force, timing.period_s)
-    signals = replace(signals, position=position)
-    return _Rows(signals, timing.period_s, joints, (*notices, *timing.notices, *jumps))
+def _jitter(runs: tuple[Run, ...]) -> float | None:
+    """That of the run whose clock is the worst; None without stamps."""
+    found = [run.timing.jitter for run in runs if run.timing.jitter is not None]
+    return max(found) if found else None
 
 
-def _without_standstill(rows: _Rows) -> _Rows:
+def _without_standstill(rows: Rows) -> Rows:
     """Without rows at either end in which the position stands still while the force goes on."""
     force, position = rows.signals.force, rows.signals.position
     start, stop = moving_part(force, position, increment_unit(position) or 0.0)
-    return _Rows(
+    return Rows(
         rows.signals[start:stop],
         rows.period_s,
         tuple(joint - start for joint in rows.joints if start < joint < stop),
@@ -200,7 +169,7 @@ def _without_standstill(rows: _Rows) -> _Rows:
     )
 
 
-def _a_row_a_period(rows: _Rows, held: int, stamped: bool, told_s: float | None) -> _Rows:
+def _a_row_a_period(rows: Rows, held: int, stamped: bool, told_s: float | None) -> Rows:
     """One row for each period of the loop; what is held for several rows is said.
 
     `held` is for how many rows the force is, before any was left out.
@@ -234,10 +203,10 @@ def _a_row_a_period(rows: _Rows, held: int, stamped: bool, told_s: float | None)
     return replace(rows, notices=rows.notices + said)
 
 
-def _once(rows: _Rows, signals: _Signals, often: float, joints: tuple[int, ...]) -> _Rows:
+def _once(rows: Rows, signals: Signals, often: float, joints: tuple[int, ...]) -> Rows:
     """`signals`, the new rows alone where every row stood so often in the mean."""
     period_s = often * rows.period_s
-    return _Rows(signals, period_s, joints, (*rows.notices, rows_alike(often, period_s)))
+    return Rows(signals, period_s, joints, (*rows.notices, rows_alike(often, period_s)))
 
 
 def _in_base_unit(
@@ -287,8 +256,8 @@ def _signal(values: ArrayLike, what: str, where: str) -> NDArray[np.float64]:
         start, stop = longest(np.isfinite(signal))
         raise InputError(
             f"{where}: {what} is {signal[bad[0]]} in row {bad[0] + 1} ({such(len(bad), 'row')}); "
-            "remove them (few in one place are put back by their times), or read the longest part "
-            f"without, --rows {start + 1}:{stop}",
+            "remove them (few in one place are put back by their times, where many were another "
+            f"piece begins), or read the longest part without, --rows {start + 1}:{stop}",
             topic="rows",
         )
     signal.setflags(write=False)

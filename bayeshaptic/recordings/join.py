@@ -13,10 +13,8 @@ from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.read import recording_of
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.sensed import Sensed
+from bayeshaptic.recordings.signals.rows.pauses import FEWEST_SAMPLES
 from bayeshaptic.types import Floats
-
-# Shorter than this, a piece has too few lines for windows of its own.
-FEWEST_SAMPLES = 250
 
 
 @at_the_door

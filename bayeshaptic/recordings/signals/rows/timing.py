@@ -88,7 +88,7 @@ def sampling_period(
                 "or give the sampling period with --period-s"
             )
         return Timing(float(period_s))
-    time_s, counted = _counted_on(time_s)
+    time_s, counted = counted_on(time_s)
     if period_s is None:
         timing = _from_stamps(time_s, where)
         return replace(timing, notices=(*counted, *timing.notices))
@@ -106,7 +106,7 @@ def sampling_period(
     return Timing(float(period_s), stamps.jitter, counted)
 
 
-def _counted_on(time_s: Floats) -> tuple[Floats, tuple[Notice, ...]]:
+def counted_on(time_s: Floats) -> tuple[Floats, tuple[Notice, ...]]:
     """The stamps of a timer that begins again after 2^16, 2^24 or 2^32 ticks, counted on; a note.
 
     What each step back lacks of a usual one is the timer's range. Recordings that stand one after
