@@ -89,9 +89,11 @@ def close_loop(
     begun, traced = traced_as_of_the_loop(begun, model, chosen.within(0.05, 0.4))
     tracing = time.perf_counter() - began
     if traced.verdict == UNEXPLAINED and begun.etfe.through_reference:
-        one_mass = _one_mass_instead(measurement, begun, model, chosen)
-        if one_mass is not None:
-            return one_mass
+        instead = _one_mass_instead(measurement, begun, model, chosen)
+        if instead is None:
+            instead = _longest_piece_instead(found, model, chosen)
+        if instead is not None:
+            return instead
     closed = _before_and_after(begun, traced, tracing, chosen)
     return with_average(closed, prior, chosen) if chosen.hidden else closed
 
@@ -161,6 +163,14 @@ def _one_mass_instead(
     force = explain_force(found.etfe.recording)
     closed = None if force is None else _in_loop(found, force, options)
     return None if closed is None or closed.verdict == UNEXPLAINED else closed
+
+
+def _longest_piece_instead(found: Opened, model: str | Model, options: Options) -> Closed | None:
+    """The closed loop by the direct method of the longest piece, where it leaves noise alone."""
+    if found.etfe.unbroken is not None:  # it was asked before
+        return None
+    direct = by_direct_method(found, model, options, longest=True)
+    return direct if isinstance(direct, Closed) else None
 
 
 def _refused(begun: Begun, force: ForceExplained | None, options: Options) -> Closed:

@@ -32,7 +32,9 @@ from bayeshaptic.numerics.spending import RATE, Meter, counting
 from bayeshaptic.stability.from_etfe import EtfeCriticalStiffness
 
 
-def by_direct_method(found: Opened, model: str | Model, options: Options) -> Closed | Opened:
+def by_direct_method(
+    found: Opened, model: str | Model, options: Options, longest: bool = False
+) -> Closed | Opened:
     """The closed loop by the direct method; or `found`, with a notice of what speaks against it.
 
     The method is not for one mass, which is followed in time with its friction.  Its fit stands
@@ -45,8 +47,10 @@ def by_direct_method(found: Opened, model: str | Model, options: Options) -> Clo
     model : str or Model
         As asked for.
     options : Options
+    longest : bool
+        See `opened_directly`.
     """
-    lines = opened_directly(found, options)
+    lines = opened_directly(found, options, longest)
     if lines is None:
         return found
     try:
@@ -79,7 +83,7 @@ def by_direct_method(found: Opened, model: str | Model, options: Options) -> Clo
             analysis,
             limit=limit,
             widened=with_law_error(analysis.posterior, begun.fit, traced, seed),
-            recording=found.etfe.recording,
+            recording=begun.etfe.recording,
             seconds={**analysis.seconds, "closing the loop": tracing_s},
         )
     before, after = _error(base, begun.fit, fit), _error(analysis, fit, fit)

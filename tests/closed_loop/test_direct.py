@@ -7,15 +7,20 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from bayeshaptic.diagnosis.base.direct import opened_directly
+from bayeshaptic.diagnosis.base.opened import opened
 from bayeshaptic.diagnosis.close_loop import close_loop
+from bayeshaptic.diagnosis.options import options_from
 from bayeshaptic.diagnosis.residuals.causal import scores
 from bayeshaptic.inference.choose import _with_the_hand_for_a_mass, choose_model
 from bayeshaptic.inference.least_squares import SETS, least_squares, likeliest
 from bayeshaptic.models import free, grasped
 from bayeshaptic.models.start import informed
 from bayeshaptic.recordings.from_arrays import recording_from_arrays
+from bayeshaptic.recordings.join import join_recordings
 from bayeshaptic.recordings.response.estimate import estimate_by_direct_method
 from bayeshaptic.report.headline import headline
+from bayeshaptic.report.status import CAUTION
 from bayeshaptic.rig import Bench, run_loop
 from bayeshaptic.stability.critical import critical_stiffness
 
@@ -103,6 +108,38 @@ def test_a_held_device_gets_a_limit_where_its_reference_is_known_too():
     assert closed.analysis.etfe.direct
     told = headline(closed)
     assert 0.5 * truth < told.stiffness < truth
+
+
+def test_of_several_pieces_the_longest_is_fitted():
+    """Nothing followed from several, where each alone had a limit."""
+    bench, truth, recording = loop(3, device="lhifam")
+    _, _, shorter = loop(4, device="lhifam", seconds=4.0)
+    joined = join_recordings([replace(shorter, name="short"), replace(recording, name="long")])
+    closed = close_loop(joined, hidden=False, held=False, delay_s=bench.delay_s)
+    assert closed.analysis.etfe.direct
+    assert closed.analysis.recording.samples == recording.samples
+    low, high = (float(closed.analysis.limit.quantile(p)) for p in (0.005, 0.995))
+    assert low <= truth <= high
+    told = headline(closed)
+    assert told.status == CAUTION and 0.5 * truth < told.stiffness < truth
+    (text,) = [
+        n.text for n in closed.analysis.notices if (n.level, n.topic) == ("warning", "pieces")
+    ]
+    assert "long, the longest of 2" in text
+
+
+def test_the_longest_piece_is_asked_after_the_reference_where_that_is_known():
+    """All pieces are read through it; the longest alone is asked where that leaves too much."""
+    bench, _, recording = loop(3, device="lhifam", known=True)
+    pieces = recording.part(0, 3000), recording.part(3000, recording.samples)
+    joined = join_recordings([replace(one, name=f"{n}") for n, one in enumerate(pieces)])
+    options = options_from(None, {"held": False, "delay_s": bench.delay_s})
+    found = opened(joined, "auto", options)
+    assert found.etfe.through_reference
+    assert opened_directly(found, options) is None
+    lines = opened_directly(found, options, longest=True)
+    assert lines is not None and lines.etfe.direct
+    assert lines.etfe.recording.samples == pieces[1].samples
 
 
 def test_an_effect_is_named_in_a_loop_of_which_nothing_is_known():

@@ -10,6 +10,7 @@ from bayeshaptic.diagnosis.options import Options
 from bayeshaptic.diagnosis.residuals.residual import Test
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.inference.fit import Fit
+from bayeshaptic.quantities import quantity
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
 from bayeshaptic.recordings.feedback import doubts, has_feedback, how_computed
 from bayeshaptic.recordings.recording import Recording
@@ -25,23 +26,27 @@ _WHATEVER = (
 )
 
 
-def opened_directly(found: Opened, options: Options) -> Opened | None:
+def opened_directly(found: Opened, options: Options, longest: bool = False) -> Opened | None:
     """`found` with the spectra of the direct method; None where the method is not meant for it.
 
     It is meant for recordings with feedback, and for those where feedback cannot be ruled out, also
-    where a reference is known.  It is not meant for recordings in pieces, for a band that was asked
-    for (it needs all lines), or for a device declared to be one mass, which is followed in time.
-    Where the reading hung, the longest part without is fitted.
+    where a reference is known.  It is not meant for a band that was asked for (it needs all lines),
+    or for a device declared to be one mass, which is followed in time.  Where the reading hung, the
+    longest part without is fitted, and of several pieces the longest.
 
     Parameters
     ----------
     found : Opened
     options : Options
+    longest : bool
+        Of several pieces also where a reference is known, through which all of them can be read.
     """
-    recording = found.etfe.unbroken
-    if recording is None or found.one_mass or options.band_hz is not None:
-        return None
     through = found.etfe.through_reference
+    recording, alone = _longest(found.etfe.recording)
+    if recording is None or (alone and through and not longest):
+        return None
+    if found.one_mass or options.band_hz is not None:
+        return None
     if not (through or has_feedback(found.notices)) or told_too_little(found.notices):
         return None
     try:
@@ -53,8 +58,22 @@ def opened_directly(found: Opened, options: Options) -> Opened | None:
     text = f"The force {how}; the device is read from it {_WHATEVER}"
     kept = (n for n in found.notices if n.topic not in ("feedback", "band"))
     note = Notice("note", "feedback", text, doubts(found.notices))
-    notices = (*kept, *etfe.notices, note, *hangs)
+    notices = (*kept, *etfe.notices, note, *alone, *hangs)
     return replace(found, etfe=etfe, notices=notices)
+
+
+def _longest(recording: Recording | None) -> tuple[Recording | None, tuple[Notice, ...]]:
+    """The longest piece of a recording, and a warning that the others take no part."""
+    if recording is None or not recording.joints:
+        return recording, ()
+    longest = max(recording.pieces, key=lambda piece: piece.samples)
+    others = len(recording.pieces) - 1
+    text = (
+        f"In closed loop one piece is fitted: {longest.name}, the longest of {others + 1} "
+        f"({quantity(longest.duration_s, 's')}). The other{'s take' if others > 1 else ' takes'} "
+        "no part; report on each by itself, too."
+    )
+    return longest, (Notice("warning", "pieces", text),)
 
 
 def _while_it_was_read(recording: Recording) -> tuple[Recording, tuple[Notice, ...]]:
