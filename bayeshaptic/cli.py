@@ -75,6 +75,12 @@ class _CommandParser(_Parser):
         if unknown:
             option = unknown[0].partition("=")[0]
             near = nearest(option, self._option_string_actions) if option[:1] == "-" else ""
+            if not near and os.path.isfile(option):
+                near = (
+                    ": one source at a time; several recordings of one device are a study (.toml), "
+                    "of which 'bayeshaptic inspect FILE --write study.toml' makes the beginning, "
+                    "and 'bayeshaptic batch' reports on each by itself"
+                )
             self.error(f"unrecognized arguments: {' '.join(unknown)}{near}")
         return found, unknown
 

@@ -774,10 +774,14 @@ def test_a_terminal_that_lacks_a_sign_shows_another(phantom: Path) -> None:
     assert b"position" in done.stdout and b"?" in done.stdout
 
 
-def test_a_mistyped_option_is_answered_by_its_command(run: Run) -> None:
+def test_a_mistyped_option_is_answered_by_its_command(run: Run, tmp_path: Path) -> None:
     for wrong, right in (("--colums", "--columns"), ("--wrkers=2", "--workers")):
         status, _, err = run("report", "a.csv", wrong)
         assert status == 2 and err.startswith("bayeshaptic report: error: unrecognized arguments")
         assert f"did you mean '{right}'?" in err and err.count("\n") == 1
     status, _, err = run("report", "a.csv", "b.csv")
     assert status == 2 and "unrecognized arguments: b.csv (see bayeshaptic report" in err
+    there = tmp_path / "b.csv"
+    there.touch()
+    status, _, err = run("report", "a.csv", str(there))
+    assert status == 2 and "are a study (.toml)" in err and "'bayeshaptic batch'" in err

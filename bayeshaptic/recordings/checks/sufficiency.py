@@ -134,7 +134,13 @@ def _short(recording: Recording) -> TooLittle | None:
         f"{seconds:.3g} s, and at least {least:.3g} s are needed of a force that does not repeat, "
         f"at {quantity(1 / recording.period_s, 'Hz')}"
     )
-    return TooLittle(reason, _USUAL)
+    return TooLittle(reason, _together(recording))
+
+
+def _together(recording: Recording) -> str:
+    """What to do where more of the same would be enough: pieces count as all of them."""
+    others = "" if recording.joints else ", or count it together with others of it in a study"
+    return _USUAL + others
 
 
 def _few_steps(recording: Recording) -> TooLittle | None:
@@ -147,7 +153,7 @@ def _few_steps(recording: Recording) -> TooLittle | None:
         f"the force changes {times} in {recording.duration_s:.3g} s, and a step says next to "
         "nothing of the response above a few hertz"
     )
-    return TooLittle(reason, _USUAL)
+    return TooLittle(reason, _together(recording))
 
 
 def few_tones(recording: Recording) -> TooLittle | None:

@@ -64,7 +64,10 @@ def read_arrays(path: Path) -> Arrays:
     if not path.exists():
         raise InputError(f"{path}: no such file")
     if path.is_dir():
-        raise InputError(f"{path}: a folder; name a recording in it, or a study (.toml)")
+        raise InputError(
+            f"{path}: a folder; name a recording in it, or a study (.toml), or report on each of "
+            "its recordings by 'bayeshaptic batch'"
+        )
     reader = reader_for(path)
     if not path.is_file():
         raise InputError(f"{path}: not a file")
