@@ -38,6 +38,7 @@ from bayeshaptic.diagnosis.widening.rivals import with_rivals
 from bayeshaptic.errors import Notice
 from bayeshaptic.models import Model
 from bayeshaptic.recordings.checks.sufficiency import told_too_little
+from bayeshaptic.recordings.checks.unlike_pieces import still_unlike
 from bayeshaptic.recordings.feedback import has_feedback, is_certain
 from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.etfe import Etfe
@@ -115,7 +116,8 @@ def _before_and_after(begun: Begun, traced: Traced, tracing_s: float, options: O
         )
     limit, traced = with_rivals(analysis.limit, traced, seed)
     limit = with_discrepancy(limit, analysis.posterior, begun.fit, traced, seed)
-    notices = analysis.notices + traced.notices + perhaps_late(state.fit)
+    notices = still_unlike(analysis.notices, state.etfe)
+    notices += traced.notices + perhaps_late(state.fit)
     if state.etfe.through_reference and not state.etfe.moved_throughout:
         notices += mode_above_band(state.fit, state.etfe, analysis.limit)
     if (noise := noise_besides(state.fit, state.etfe)) is not None:

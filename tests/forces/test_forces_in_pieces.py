@@ -28,6 +28,7 @@ from bayeshaptic.effects.nonlinear.protocol import Acting
 from bayeshaptic.inference.least_squares import least_squares
 from bayeshaptic.models import build_model
 from bayeshaptic.numerics.spending import Meter
+from bayeshaptic.recordings.checks.unlike_pieces import named_unlike, still_unlike, unlike_pieces
 from bayeshaptic.recordings.response.estimate import estimate_etfe
 from bayeshaptic.rig import Bench, simulate
 from bayeshaptic.stability import critical_stiffness
@@ -118,3 +119,19 @@ def test_not_where_somebody_holds_them_nor_of_an_actuator(monkeypatch: pytest.Mo
     one_piece = replace(state, etfe=state.etfe.parts[0])
     assert tried.called_for(one_piece, {"command"}, motion)[0]
     assert tried.called_for(state, {"command"}, motion) == ([], [])
+
+
+def test_pieces_of_several_levels_are_alike_without_their_friction() -> None:
+    """They were said to be of several devices, and no stiffness followed."""
+    bench = BENCH.with_effect("coulomb_friction", force=0.3 * BENCH.force_rms)
+    made = []
+    for level, seed in ((0.6, 1), (3.0, 2)):
+        noise = usual_noise(replace(bench, force_rms=level * bench.force_rms), 4.0)
+        made.append(bh.recording_from_arrays(**simulate(bench, noise, seed=seed).signals))
+    etfe = estimate_etfe(bh.join_recordings(made))
+    told = unlike_pieces(etfe)
+    assert named_unlike(told)
+    assert still_unlike(told, etfe) == told  # nothing was taken off
+    state = State(etfe, least_squares(build_model("free", "lhifam"), etfe))
+    trial = max(nonlinear_trials(state, {"sign(v)"}, Meter(1e9)), key=lambda one: one.score)
+    assert named_unlike(still_unlike(told, trial.state.etfe)) == ()

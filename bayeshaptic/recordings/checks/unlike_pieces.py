@@ -80,6 +80,25 @@ def named_unlike(notices: Iterable[Notice]) -> tuple[str, ...]:
     return ()
 
 
+def still_unlike(notices: Iterable[Notice], etfe: Etfe) -> tuple[Notice, ...]:
+    """Notices of which those of unlike pieces are of what is left without the forces that act.
+
+    Dry friction beside a larger force is a smaller damper: pieces of several levels have several
+    responses, and one without the friction.
+
+    Parameters
+    ----------
+    notices : iterable of Notice
+    etfe : Etfe
+        Without what forces add to the motion.
+    """
+    told = tuple(notices)
+    if not named_unlike(told) or not etfe.parts:
+        return told
+    others = tuple(n for n in told if n.about[:1] != (UNLIKE,))
+    return others + unlike_pieces(etfe)
+
+
 def _difference(one: Etfe, others: Sequence[Etfe]) -> _Difference:
     frequency = np.asarray(one.frequency_hz)
     weighted, known = np.zeros(len(frequency), complex), np.zeros(len(frequency))
