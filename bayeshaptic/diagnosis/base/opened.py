@@ -212,10 +212,9 @@ def _not_looked_for(recording: Recording | None, notices: tuple[Notice, ...]) ->
     if has_feedback(notices) or told_too_little(notices):
         return ()
     text = (
-        "In several pieces taken as one neither drift nor faults of samples are looked for. Dry "
-        "friction (or any other force that is not linear) is taken off where nobody holds the "
-        "device, none of an actuator, and none of what somebody holds, where it makes the limit "
-        "too high: report on the longest piece by itself, too."
+        "In several pieces taken as one neither drift nor faults of samples nor forces of an "
+        "actuator are looked for, and where somebody holds the device no force is taken off: dry "
+        "friction makes the limit too high there. Report on the longest piece by itself, too."
     )
     return (Notice("warning", "pieces", text),)
 
