@@ -22,7 +22,7 @@ from bayeshaptic.recordings.response.windows import Windows
 from bayeshaptic.shown import Shown, data_frame, listed
 from bayeshaptic.types import Complexes, Floats
 
-_CLEAR_SDS = 2.0  # beyond which a number is clearly above zero
+_CLEAR_SDS = 2.0  # beyond which a number is clearly above zero; counts in docs/statistics.md
 CONVERGED, AT_BOUND, PRIOR_DOMINATED = "converged", "at a bound", "prior-dominated"
 MISFIT = 1.3  # reduced chi-square of a model that lacks something; clean recordings stay below 1.1
 SAME_PERIOD = 1e-3  # relative: time stamps are rounded

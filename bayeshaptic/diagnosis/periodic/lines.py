@@ -35,6 +35,7 @@ from bayeshaptic.diagnosis.state import (
     share,
 )
 from bayeshaptic.diagnosis.trials.linear import accepted_with, sieve
+from bayeshaptic.diagnosis.trials.taken_off import others
 from bayeshaptic.diagnosis.trials.told_apart import told_apart
 from bayeshaptic.effects.effect import LinearEffect
 from bayeshaptic.effects.nonlinear.internal_force import Place
@@ -131,7 +132,7 @@ class LineTrials:
                 continue
             loss = full - self._log_likelihoods(tried)[1]
             if needless(loss, len(effect.parameters) or 1) and loss < least:
-                worst, least = self._state(tried, _others(state.accepted, index)), loss
+                worst, least = self._state(tried, others(state.accepted, index)), loss
         return worst
 
     def told_apart(self, state: State, meter: Meter) -> State:
@@ -244,7 +245,7 @@ class LineTrials:
         assert isinstance(state, BalancedState)
         with suppress(np.linalg.LinAlgError):
             if (tried := self._without(state.part, state.accepted[index])) is not None:
-                return self._state(tried, _others(state.accepted, index))
+                return self._state(tried, others(state.accepted, index))
         return None
 
     def _rest(self, balanced: Balanced) -> Windows:
@@ -267,7 +268,3 @@ class LineTrials:
         corrected = replace(self.etfe, spectra=own, value=value)
         fit = least_squares(whole.model, corrected, start=whole.theta)
         return BalancedState(corrected, fit, sized(accepted, whole), part=part, whole=whole)
-
-
-def _others(accepted: tuple[Accepted, ...], index: int) -> tuple[Accepted, ...]:
-    return accepted[:index] + accepted[index + 1 :]

@@ -11,6 +11,7 @@ import numpy as np
 from bayeshaptic.diagnosis.state import Accepted, Change, State
 from bayeshaptic.inference.fit import summarise
 from bayeshaptic.inference.least_squares import least_squares
+from bayeshaptic.recordings.recording import Recording
 from bayeshaptic.recordings.response.estimators.joined import JoinedSpectra
 from bayeshaptic.recordings.response.etfe import Etfe
 from bayeshaptic.recordings.response.spectra import RandomSpectra
@@ -26,37 +27,36 @@ def with_forces(
     """
     if etfe.parts:
         return _with_forces_in_parts(etfe, changes, sign)
-    own, spectra = etfe.recording, etfe.spectra
-    assert own is not None and isinstance(spectra, RandomSpectra)
+    spectra = etfe.spectra
+    assert isinstance(spectra, RandomSpectra)
     for change in changes:
-        own = replace(
-            own,
-            force=own.force + sign * change.command,
-            position=own.position + sign * change.motion,
-        )
         spectra = replace(
             spectra,
             force=spectra.force + sign * change.force,
             position=spectra.position + sign * change.position,
         )
+    own = _moved(etfe, changes, sign)
     return replace(etfe, spectra=replace(spectra, louder=louder), recording=own)
+
+
+def _moved(etfe: Etfe, changes: Sequence[Change], sign: float) -> Recording:
+    """The recording with what forces add to its samples."""
+    own = etfe.recording
+    assert own is not None
+    force = own.force + sign * sum(change.command for change in changes)
+    return replace(own, force=force, position=own.position + sign * sum(c.motion for c in changes))
 
 
 def _with_forces_in_parts(etfe: Etfe, changes: Sequence[Change], sign: float) -> Etfe:
     """The same of a recording in several pieces, which nobody holds."""
-    whole, spectra = etfe.recording, etfe.spectra
-    assert whole is not None and isinstance(spectra, JoinedSpectra)
-    for change in changes:
-        whole = replace(
-            whole,
-            force=whole.force + sign * change.command,
-            position=whole.position + sign * change.motion,
-        )
+    spectra = etfe.spectra
+    assert isinstance(spectra, JoinedSpectra)
     parts = tuple(
         with_forces(part, [_of_a_part(change, lines, span) for change in changes], sign)
         for part, lines, span in zip(etfe.parts, spectra.own_lines, etfe.spans, strict=True)
     )
     joined = JoinedSpectra(tuple(part.spectra for part in parts))
+    whole = _moved(etfe, changes, sign)
     return replace(etfe, parts=parts, spectra=joined, recording=whole)
 
 
@@ -85,20 +85,27 @@ def put_back(etfe: Etfe, change: Change, rest: Sequence[Accepted]) -> Etfe:
 
 def undone(state: State, index: int) -> State:
     """The state without the accepted effect of an index, which has a change to undo."""
-    bare = left_bare(state, index)
-    return replace(bare, fit=least_squares(bare.model, bare.etfe, start=bare.fit.theta))
+    change = state.accepted[index].change
+    assert change is not None
+    if change.effect is not None:
+        bare = left_bare(state, index)
+        model, etfe, theta, left = bare.model, bare.etfe, bare.fit.theta, bare.accepted
+    else:
+        model, theta, left = state.model, state.fit.theta, others(state.accepted, index)
+        etfe = put_back(state.etfe, change, left)
+    return State(etfe, least_squares(model, etfe, start=theta), left)
 
 
 def left_bare(state: State, index: int) -> State:
-    """The state without the accepted effect of an index, and everything else where it is."""
+    """The state without the accepted linear effect of an index, and everything else in place."""
     change = state.accepted[index].change
-    assert change is not None
-    left = state.accepted[:index] + state.accepted[index + 1 :]
-    model, etfe, theta = state.model, state.etfe, state.fit.theta
-    if change.effect is not None:
-        gone = {parameter.name for parameter in change.effect.parameters}
-        theta = theta[[name not in gone for name in model.names]]
-        model = model.without_effect(change.effect)
-    else:
-        etfe = put_back(etfe, change, left)
-    return State(etfe, summarise(model, state.fit.windows, theta), left)
+    assert change is not None and change.effect is not None
+    model, gone = state.model, {parameter.name for parameter in change.effect.parameters}
+    theta = state.fit.theta[[name not in gone for name in model.names]]
+    fit = summarise(model.without_effect(change.effect), state.fit.windows, theta)
+    return State(state.etfe, fit, others(state.accepted, index))
+
+
+def others(accepted: tuple[Accepted, ...], index: int) -> tuple[Accepted, ...]:
+    """What was accepted besides that of an index."""
+    return accepted[:index] + accepted[index + 1 :]

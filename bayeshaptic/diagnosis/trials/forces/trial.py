@@ -82,24 +82,15 @@ def _estimates(model: Model, force: Acting, sd: float) -> dict[str, Estimate]:
 
 def _with_points(etfe: Etfe, fit: Fit) -> Etfe:
     """With what a person sees of it made from its own spectra."""
-    if etfe.parts:
-        parts = tuple(_with_points(part, fit) for part in etfe.parts)
-        mean = mean_of_longest(parts)
-        return replace(
-            etfe,
-            frequency_hz=mean.frequency_hz,
-            value=mean.value,
-            variance=mean.variance,
-            coherence=mean.coherence,
-            parts=parts,
-        )
-    found = points_of(etfe.spectra.windows(fit.response))
+    parts = tuple(_with_points(part, fit) for part in etfe.parts)
+    found = mean_of_longest(parts) if parts else points_of(etfe.spectra.windows(fit.response))
     return replace(
         etfe,
         frequency_hz=found.frequency_hz,
         value=found.value,
         variance=found.variance,
         coherence=found.coherence,
+        parts=parts,
     )
 
 

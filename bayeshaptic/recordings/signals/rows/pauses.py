@@ -13,6 +13,7 @@ import numpy as np
 
 from bayeshaptic.errors import InputError, Notice
 from bayeshaptic.recordings.signals.rows.timing import (
+    AGREE,
     LONGEST_GAP,
     Timing,
     counted_on,
@@ -24,7 +25,6 @@ from bayeshaptic.types import Floats, Ints
 FEWEST_SAMPLES = 250
 # How far the periods of two pieces may lie apart: what clocks' stamps leave open.
 _APART = 1e-3
-_GIVEN = 0.01  # and that of the stamps from the one that was given, as in `sampling_period`
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def _alike(runs: list[Run], period_s: float | None) -> bool:
     """Whether all have one period, and that which was given."""
     periods = np.array([run.timing.period_s for run in runs])
     mean = float(np.median(periods))
-    given = period_s is None or abs(mean / period_s - 1) <= _GIVEN
+    given = period_s is None or abs(mean / period_s - 1) <= AGREE
     return given and bool(np.all(np.abs(periods / mean - 1) <= _APART))
 
 

@@ -21,6 +21,7 @@ LONGEST_GAP, MOST_MISSING = 8, 0.01
 _WORTH_READING = 1000  # rows, about what a response can be read from
 _TIMER_BITS = 16, 24, 32
 LOOP = "loop"  # what a warning of the topic "period" is about, where it doubts the loop's period
+AGREE = 0.01  # relative: how far the stamps' period may lie from the one that was given
 NOTABLE_JITTER = 0.005  # of the stamps: from here on worth a warning
 
 
@@ -75,8 +76,7 @@ def sampling_period(
     Raises
     ------
     InputError
-        For an impossible period; without a period for stamps that show no even sampling (with the
-        row, counted from 1).
+        For an impossible period, or stamps of no even sampling and no period (rows count from 1).
     """
     period_s = None if period_s is None else float(period_s)
     if period_s is not None and not (np.isfinite(period_s) and period_s > 0):
@@ -97,7 +97,7 @@ def sampling_period(
     except InputError as error:
         text = f"{error}. The period given, {period_s:g} s, is used and the time stamps are not."
         return Timing(float(period_s), None, (Notice("warning", "time stamps", text),))
-    if abs(stamps.period_s / period_s - 1) > 0.01:
+    if abs(stamps.period_s / period_s - 1) > AGREE:
         text = (
             f"The time stamps show a period of {stamps.period_s:.6g} s; the period given, "
             f"{period_s:g} s, is used."
