@@ -213,8 +213,9 @@ def _not_looked_for(recording: Recording | None, notices: tuple[Notice, ...]) ->
         return ()
     text = (
         "In several pieces taken as one neither drift nor faults of samples nor forces of an "
-        "actuator are looked for, and where somebody holds the device no force is taken off: dry "
-        "friction makes the limit too high there. Report on the longest piece by itself, too."
+        "actuator are looked for. Dry friction makes the limit too high where it is not taken off "
+        "(somebody holds the device) or not seen (it coasts between steps): record noise, and "
+        "report on the longest piece by itself, too."
     )
     return (Notice("warning", "pieces", text),)
 

@@ -17,7 +17,7 @@ def called_for(
     others: list[Variants] = []
     for kind in effects("nonlinear"):
         if state.etfe.parts and issubclass(kind, CommandEffect):
-            continue  # whether an actuator's limit falls with its speed pieces are not asked
+            continue  # pieces are not asked whether an actuator's limit falls with its speed
         near = [e for e in kind.candidates(state.model, motion) if not is_there(e, state)]
         called = [e for e in near if e.called_for(over)]
         if called and kind.strength[0] in firsts:
